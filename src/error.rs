@@ -1,0 +1,104 @@
+//! The one error type, sorted by what the user can do about it (and so by exit code).
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// Every way a command can fail. The message says where, what, and what else was possible.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The command line or a parameter is wrong. Exit code 2.
+    #[error("{0}")]
+    Usage(String),
+    /// A file was read, but what stands in it cannot be used. Exit code 2.
+    #[error("{place}: {message}")]
+    Content {
+        /// Where it stands.
+        place: Place,
+        /// What is wrong, and what was possible instead.
+        message: String,
+    },
+    /// A file cannot be opened, read or written. Exit code 3.
+    #[error("{}: cannot {action}: {reason}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// "open", "read", "write", "create".
+        action: &'static str,
+        /// What the operating system says.
+        reason: String,
+    },
+    /// A fault of ours or of a library below us. Exit code 4.
+    #[error("internal failure: {0}")]
+    Internal(String),
+}
+
+/// `Result` with this crate's [`Error`].
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// A place in a file: line and column count from 1; 0 means "not known".
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Place {
+    /// The file.
+    pub path: PathBuf,
+    /// Line, from 1; 0 where the format has no lines or the place is not known.
+    pub line: usize,
+    /// Column in characters, from 1; 0 as above.
+    pub column: usize,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.path.display())?;
+        if self.line > 0 {
+            write!(f, ":{}", self.line)?;
+            if self.column > 0 {
+                write!(f, ":{}", self.column)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Error {
+    /// Content of `path` that cannot be used, place within it unknown.
+    pub fn content(path: &Path, message: impl Into<String>) -> Self {
+        Error::Content { place: Place { path: path.to_owned(), ..Place::default() }, message: message.into() }
+    }
+
+    /// Content at a line of `path` (from 1) that cannot be used.
+    pub fn content_at(path: &Path, line: usize, column: usize, message: impl Into<String>) -> Self {
+        Error::Content { place: Place { path: path.to_owned(), line, column }, message: message.into() }
+    }
+
+    /// A failed file operation; `action` completes "cannot ...".
+    pub fn file(path: &Path, action: &'static str, reason: impl fmt::Display) -> Self {
+        Error::File { path: path.to_owned(), action, reason: reason.to_string() }
+    }
+
+    /// The process exit code that this error means (README, "Exit codes").
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Error::Usage(_) | Error::Content { .. } => 2,
+            Error::File { .. } => 3,
+            Error::Internal(_) => 4,
+        }
+    }
+}
+
+/// `unknown material "glas"; did you mean "glass"? known: diffuse, glass`
+pub fn unknown_name<'a>(what: &str, name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
+    let known: Vec<&str> = known.into_iter().collect();
+    let near = known
+        .iter()
+        .map(|k| (strsim::damerau_levenshtein(k, name), *k))
+        .min()
+        .filter(|(d, k)| *d <= 1 + k.len().max(name.len()) / 3);
+    let mut text = format!("unknown {what} \"{name}\"");
+    if let Some((_, k)) = near {
+        text += &format!("; did you mean \"{k}\"?");
+    }
+    if !known.is_empty() {
+        text += &format!(" known: {}", known.join(", "));
+    }
+    text
+}

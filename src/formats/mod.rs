@@ -1,0 +1,1 @@
+//! L4: files to plain scene data, one file a format.

@@ -1,0 +1,1 @@
+//! L4: pictures in and out.

@@ -1,0 +1,13 @@
+//! skylit: triangle meshes and quadrics under skies, traced fast and accurately on the CPU.
+
+pub mod base;
+pub mod color;
+pub mod error;
+pub mod formats;
+pub mod image;
+pub mod math;
+pub mod render;
+pub mod sampler;
+pub mod sampling;
+
+pub use error::{Error, Result};

@@ -1,0 +1,1 @@
+//! L0: geometry and exact arithmetic helpers.

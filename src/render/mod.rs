@@ -1,0 +1,1 @@
+//! L4: how a scene becomes a film.
