@@ -8,7 +8,8 @@ pub static SRGB8_TO_LINEAR: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|i| srgb_to_linear(i as f32 / 255.0)));
 
 /// byte / 255.
-pub static LINEAR8_TO_LINEAR: LazyLock<[f32; 256]> = LazyLock::new(|| std::array::from_fn(|i| i as f32 / 255.0));
+pub static LINEAR8_TO_LINEAR: LazyLock<[f32; 256]> =
+    LazyLock::new(|| std::array::from_fn(|i| i as f32 / 255.0));
 
 /// Pixel storage. Eight-bit pictures stay eight-bit (a 2048-texel cube map is 100 MB instead of 300).
 #[derive(Debug, Clone, PartialEq)]

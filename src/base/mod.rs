@@ -1,4 +1,17 @@
 //! L1: the nouns and traits of the house, without implementations. Imports only L0.
 
+pub mod camera;
+pub mod geometry;
+pub mod hit;
 pub mod image_data;
+pub mod intersectable;
+pub mod light;
+pub mod material;
+pub mod mesh;
 pub mod mesh_data;
+pub mod ray;
+pub mod registry;
+pub mod shape;
+pub mod skybox;
+pub mod texture;
+pub mod vertex;

@@ -1,1 +1,4 @@
 //! L0: geometry and exact arithmetic helpers.
+
+pub mod aabb;
+pub mod frame;

@@ -1,0 +1,78 @@
+//! The one trait behind which ray kernels stand.
+
+use crate::base::hit::{Hit, HitBatch};
+use crate::base::ray::{Coherence, Ray, RayBatch};
+use crate::error::Result;
+use crate::math::aabb::Aabb;
+
+/// Anything a ray can be tested against. Queries may come from many threads at once; a ray that is not valid
+/// ([`Ray::is_valid`]) is a miss.
+pub trait Intersectable: Send + Sync {
+    /// Encloses everything; empty if there is nothing.
+    fn bounds(&self) -> Aabb;
+
+    /// The closest hit with `tnear <= t <= tfar`.
+    fn intersect(&self, ray: &Ray) -> Option<Hit>;
+
+    /// Whether anything lies at `tnear <= t <= tfar`.
+    fn occluded(&self, ray: &Ray) -> bool;
+
+    /// Closest hits of a batch; `hits` is resized to it.
+    fn intersect_batch(&self, rays: &RayBatch, hits: &mut HitBatch, _coherence: Coherence) {
+        hits.reset(rays.len());
+        for i in 0..rays.len() {
+            hits.set(i, self.intersect(&rays.get(i)));
+        }
+    }
+
+    /// Any hit of each ray of a batch; `blocked` is resized to it.
+    fn occluded_batch(&self, rays: &RayBatch, blocked: &mut Vec<bool>, _coherence: Coherence) {
+        blocked.clear();
+        blocked.extend((0..rays.len()).map(|i| self.occluded(&rays.get(i))));
+    }
+
+    /// Bytes that the acceleration structure holds beyond the geometry it was given.
+    fn memory(&self) -> u64;
+
+    /// Name and version for records: "embree 3.13.5 robust", "brute".
+    fn describe(&self) -> String;
+
+    /// A failure inside a query (a panic in a shape's code, say) since the last call. The renderer asks at the
+    /// end of each block and then fails the render: a query itself has no way to.
+    fn take_failure(&self) -> Result<()> {
+        Ok(())
+    }
+}
+
+/// How carefully a kernel builds; every kernel maps these to its own means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum BuildQuality {
+    /// Shortest time to the first ray.
+    Fast,
+    /// The default.
+    #[default]
+    Balanced,
+    /// Fastest rays.
+    Best,
+}
+
+/// How a kernel tests.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum KernelMode {
+    /// No leaks between neighbouring triangles, as far as the kernel can promise it.
+    #[default]
+    Robust,
+    /// Fastest tests.
+    Fast,
+}
+
+/// What a kernel's builder is told beside the geometry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct KernelOptions {
+    /// See [`BuildQuality`].
+    pub quality: BuildQuality,
+    /// See [`KernelMode`].
+    pub mode: KernelMode,
+    /// Threads for the build; 0 means all.
+    pub threads: usize,
+}

@@ -1,0 +1,94 @@
+//! Where light comes from. A sky is a light like any other; a path that leaves the scene has met it.
+
+use crate::base::vertex::Vertex;
+use crate::color::Rgb;
+use glam::Vec3;
+
+/// The point that asks for light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Receiver {
+    /// Where.
+    pub p: Vec3,
+    /// Unit geometric normal towards the side that is lit, or zero if any direction may be.
+    pub ng: Vec3,
+    /// Unit shading normal of that side, or zero.
+    pub ns: Vec3,
+}
+
+/// Light arriving along a sampled direction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LightSample {
+    /// Unit direction towards the light.
+    pub wi: Vec3,
+    /// Distance to it; infinite for the sky.
+    pub dist: f32,
+    /// Radiance arriving (for a delta light: irradiance at normal incidence), before anything blocks it.
+    pub li: Rgb,
+    /// Density per solid angle; 1 for a delta light.
+    pub pdf: f32,
+    /// Whether no other way of sampling can meet this light.
+    pub delta: bool,
+}
+
+/// Where a path ended: on a surface, or nowhere.
+#[derive(Debug, Clone, Copy)]
+pub struct PathEnd<'a> {
+    /// Unit direction of travel towards the end.
+    pub wi: Vec3,
+    /// The surface, if there is one.
+    pub vertex: Option<&'a Vertex>,
+}
+
+/// A bounding sphere of what is lit, in render space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// Centre.
+    pub center: Vec3,
+    /// Radius, more than 0.
+    pub radius: f32,
+}
+
+/// A source of light, in render space.
+pub trait Light: Send + Sync {
+    /// Samples a direction to the light; None if nothing can arrive.
+    fn sample_li(&self, at: &Receiver, u: [f32; 2]) -> Option<LightSample>;
+
+    /// The density per solid angle with which [`Light::sample_li`] takes the direction to `end`; 0 for delta
+    /// lights.
+    fn pdf_li(&self, at: &Receiver, end: &PathEnd) -> f32;
+
+    /// Radiance that leaves `end` against the direction of travel.
+    fn le(&self, end: &PathEnd) -> Rgb;
+
+    /// Whether paths that leave the scene end on this light.
+    fn at_infinity(&self) -> bool {
+        false
+    }
+
+    /// Power in watts (or, for lights without end, through a disc as large as the extent): steers the choice
+    /// between lights.
+    fn power(&self, extent: &Extent) -> f32;
+
+    /// Irradiance on an unoccluded surface at `p` with unit normal `n`, where a closed form is known.
+    fn irradiance_closed_form(&self, _p: Vec3, _n: Vec3) -> Option<Rgb> {
+        None
+    }
+}
+
+/// A light chosen, with its probability.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ChosenLight {
+    /// Index in the scene's list.
+    pub light: u32,
+    /// Probability of the choice.
+    pub pmf: f32,
+}
+
+/// Chooses a light for a receiver.
+pub trait LightSampler: Send + Sync {
+    /// Chooses by `u` in [0, 1); None if no light can contribute.
+    fn sample(&self, at: &Receiver, u: f32) -> Option<ChosenLight>;
+
+    /// The probability with which [`LightSampler::sample`] chooses `light` there.
+    fn pmf(&self, at: &Receiver, light: u32) -> f32;
+}

@@ -1,0 +1,107 @@
+//! How a surface scatters and emits, in the local frame of its shading normal (z).
+
+use crate::base::shape::Needs;
+use crate::base::vertex::Vertex;
+use crate::color::Rgb;
+use bytemuck::{Pod, Zeroable};
+use glam::{Vec2, Vec3};
+
+/// Room for what a material wants to keep of a vertex: textures are read once, by [`Material::prepare`], into a
+/// plain struct of the material's own, which is viewed through [`Prepared::view`].
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C, align(16))]
+pub struct Prepared([f32; 24]);
+
+impl Default for Prepared {
+    fn default() -> Self {
+        Prepared([0.0; 24])
+    }
+}
+
+impl Prepared {
+    /// The material's own struct. Panics (at the first use, in any test) if it is larger than the room.
+    #[inline]
+    pub fn view<T: Pod>(&self) -> &T {
+        bytemuck::from_bytes(&bytemuck::bytes_of(self)[..size_of::<T>()])
+    }
+
+    /// As [`Prepared::view`], to write.
+    #[inline]
+    pub fn view_mut<T: Pod>(&mut self) -> &mut T {
+        bytemuck::from_bytes_mut(&mut bytemuck::bytes_of_mut(self)[..size_of::<T>()])
+    }
+}
+
+/// A direction sampled from a material.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BsdfSample {
+    /// Local direction, away from the surface.
+    pub wi: Vec3,
+    /// f cos / pdf: what the throughput is multiplied by.
+    pub weight: Rgb,
+    /// Density per solid angle; for a delta lobe its probability.
+    pub pdf: f32,
+    /// Whether the direction comes from a Dirac lobe, which no light sample can meet.
+    pub delta: bool,
+}
+
+/// Value and density of a pair of directions.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct BsdfEval {
+    /// f times |cos| of `wi` at the shading normal.
+    pub f_cos: Rgb,
+    /// Density per solid angle of [`Material::sample`].
+    pub pdf: f32,
+}
+
+/// Scattering and emission. All directions are local (z is the shading normal), of unit length and away from the
+/// surface; `wo` may lie below (z < 0) when the surface is seen from behind.
+pub trait Material: Send + Sync {
+    /// What [`Material::prepare`] and the emission read of a vertex.
+    fn needs(&self) -> Needs {
+        Needs::default()
+    }
+
+    /// Reads textures at the vertex into `out`, once.
+    fn prepare(&self, vertex: &Vertex, out: &mut Prepared);
+
+    /// f |cos| and density for a pair of directions; zero for delta lobes.
+    fn eval(&self, m: &Prepared, wo: Vec3, wi: Vec3) -> BsdfEval;
+
+    /// Samples `wi`. `uc` picks a lobe where there are several. None if the path ends here.
+    fn sample(&self, m: &Prepared, wo: Vec3, u: [f32; 2], uc: f32) -> Option<BsdfSample>;
+
+    /// Reflectance for light from everywhere, seen from `wo`: an estimate good to some percent, for AOVs and
+    /// decisions, not for radiometry.
+    fn albedo(&self, m: &Prepared, wo: Vec3) -> Rgb;
+
+    /// Whether it scatters by Dirac lobes alone, so that sampling lights is in vain.
+    fn is_delta(&self) -> bool {
+        false
+    }
+
+    /// Whether nothing leaves by scattering at all.
+    fn is_black(&self) -> bool {
+        false
+    }
+
+    /// Radiance emitted towards a viewer, where the material emits; `cos_o` is the cosine between the viewer and
+    /// the geometric normal (negative from behind).
+    fn emission(&self, _uv: Vec2, _cos_o: f32) -> Rgb {
+        Rgb::BLACK
+    }
+
+    /// Mean emitted radiance over the surface, and whether it emits from both sides; None if it emits nothing.
+    fn emitter(&self) -> Option<Emitter> {
+        None
+    }
+}
+
+/// What the light list has to know of an emitting material.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Emitter {
+    /// Mean radiance.
+    pub mean: Rgb,
+    /// Whether the back emits as the front does.
+    pub two_sided: bool,
+}

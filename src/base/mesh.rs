@@ -1,0 +1,54 @@
+//! A triangle mesh ready for kernels: single precision, recentred, only valid triangles.
+
+/// Triangles in the space of their group. Made by the scene builder from [`super::mesh_data::MeshData`]:
+/// every index is in range, every vertex of a triangle is finite, no triangle is degenerate.
+#[derive(Debug, Clone, Default)]
+pub struct TriangleMesh {
+    /// Vertex positions and, after them, one entry of padding: kernels read 16 bytes from a vertex' start.
+    positions: Vec<[f32; 3]>,
+    /// Three vertex indices a triangle.
+    pub indices: Vec<[u32; 3]>,
+    /// Unit shading normals by vertex; empty if flat.
+    pub normals: Vec<[f32; 3]>,
+    /// Texture coordinates by vertex, v up; empty if none.
+    pub uvs: Vec<[f32; 2]>,
+    /// Triangle number in the source by triangle; empty where it is the same number.
+    pub source_ids: Vec<u32>,
+    /// Material slot by triangle; empty where all have slot 0.
+    pub material_slots: Vec<u16>,
+}
+
+impl TriangleMesh {
+    /// From positions and indices; the padding is added here.
+    pub fn new(mut positions: Vec<[f32; 3]>, indices: Vec<[u32; 3]>) -> Self {
+        positions.push([0.0; 3]);
+        TriangleMesh { positions, indices, ..TriangleMesh::default() }
+    }
+
+    /// Vertex positions without the padding.
+    #[inline]
+    pub fn positions(&self) -> &[[f32; 3]] {
+        &self.positions[..self.positions.len().saturating_sub(1)]
+    }
+
+    /// Vertex positions with one entry of padding at the end, for kernels.
+    pub fn padded_positions(&self) -> &[[f32; 3]] {
+        &self.positions
+    }
+
+    /// The corners of a triangle.
+    #[inline]
+    pub fn corners(&self, triangle: u32) -> [glam::Vec3; 3] {
+        self.indices[triangle as usize].map(|i| glam::Vec3::from_array(self.positions[i as usize]))
+    }
+
+    /// Bytes of all arrays.
+    pub fn memory(&self) -> u64 {
+        (size_of_val(&self.positions[..])
+            + size_of_val(&self.indices[..])
+            + size_of_val(&self.normals[..])
+            + size_of_val(&self.uvs[..])
+            + size_of_val(&self.source_ids[..])
+            + size_of_val(&self.material_slots[..])) as u64
+    }
+}

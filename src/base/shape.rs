@@ -1,0 +1,133 @@
+//! Geometry in the space of its group: bounds, tests, the surface at a hit, sampling.
+
+use crate::base::mesh::TriangleMesh;
+use crate::error::Result;
+use crate::math::aabb::Aabb;
+use glam::{DAffine3, DVec3, Vec2, Vec3};
+use std::sync::Arc;
+
+/// A ray in the space of a shape's group, in double precision, so that the transform into it loses nothing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LocalRay {
+    /// Origin.
+    pub o: DVec3,
+    /// Direction, not normalised: t means the same as in render space.
+    pub d: DVec3,
+    /// Smallest t that counts.
+    pub tnear: f64,
+    /// Largest t that counts.
+    pub tfar: f64,
+}
+
+/// The surface at a refined hit, in the space of the shape's group.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surface {
+    /// Distance in lengths of the ray's direction.
+    pub t: f64,
+    /// The point, on the primitive to the precision of `error`.
+    pub p: DVec3,
+    /// How far `p` may lie from the primitive as a kernel tests it, per axis, in absolute terms: the rounding
+    /// of the shape's own data and of an f32 test of this primitive.
+    pub error: DVec3,
+    /// Geometric normal, outward, any length.
+    pub ng: DVec3,
+    /// Shading normal on the side of `ng`, any length; equals `ng` where the shape is flat.
+    pub ns: DVec3,
+    /// Texture coordinates; (0, 0) where none were asked for.
+    pub uv: Vec2,
+    /// Derivatives of the point along u and v; zero where none were asked for.
+    pub dpdu: DVec3,
+    /// See `dpdu`.
+    pub dpdv: DVec3,
+    /// From `p` to the smooth surface that `ns` pretends, for rays that leave (Hanika, "Hacking the shadow
+    /// terminator", Ray Tracing Gems II, ch. 4); zero where the shape is flat.
+    pub lift: DVec3,
+}
+
+/// What the materials of a scene read at a vertex; what nobody reads is not computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Needs {
+    /// Texture coordinates.
+    pub uv: bool,
+    /// Tangents `dpdu`, `dpdv`.
+    pub tangents: bool,
+}
+
+impl Needs {
+    /// Everything.
+    pub const ALL: Needs = Needs { uv: true, tangents: true };
+
+    /// What either needs.
+    pub fn or(self, o: Needs) -> Needs {
+        Needs { uv: self.uv || o.uv, tangents: self.tangents || o.tangents }
+    }
+}
+
+/// A point sampled on a primitive, seen from a reference point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShapeSample {
+    /// The point.
+    pub p: Vec3,
+    /// Unit geometric normal, outward.
+    pub ng: Vec3,
+    /// Texture coordinates.
+    pub uv: Vec2,
+    /// Unit direction from the reference point.
+    pub wi: Vec3,
+    /// Distance from the reference point.
+    pub dist: f32,
+    /// Density per solid angle at the reference point.
+    pub pdf: f32,
+}
+
+/// Object geometry of one or many primitives. All of a shape is in the space of its group; where it was placed
+/// there by a transform, [`Shape::transformed`] has baked it in.
+pub trait Shape: Send + Sync {
+    /// Encloses everything.
+    fn bounds(&self) -> Aabb;
+
+    /// The number of primitives; hits name one.
+    fn primitive_count(&self) -> u32;
+
+    /// Encloses a primitive; rounded outwards.
+    fn primitive_bounds(&self, prim: u32) -> Aabb;
+
+    /// The triangles, for kernels that test triangles themselves. A shape that has none is tested by
+    /// [`Shape::intersect`].
+    fn triangles(&self) -> Option<&TriangleMesh> {
+        None
+    }
+
+    /// The smallest t in `[tnear, tfar]` at which the ray meets the primitive, in double precision.
+    fn intersect(&self, ray: &LocalRay, prim: u32) -> Option<f64>;
+
+    /// The surface where the ray meets the primitive, which a kernel says it does. Must not depend on the
+    /// kernel's own t: fixed operations in a fixed order from the ray and the primitive alone. `hint` is that t,
+    /// for choosing between several crossings only.
+    fn refine(&self, ray: &LocalRay, prim: u32, hint: f32, needs: Needs) -> Surface;
+
+    /// Which of its object's materials a primitive has.
+    fn material_slot(&self, _prim: u32) -> usize {
+        0
+    }
+
+    /// Area of a primitive.
+    fn primitive_area(&self, prim: u32) -> f64;
+
+    /// A point on a primitive as seen from `from`, by solid angle where a stable formula exists, else by area;
+    /// the density is per solid angle either way. None if nothing of it can be seen from there.
+    fn sample_primitive(&self, prim: u32, from: Vec3, u: [f32; 2]) -> Option<ShapeSample>;
+
+    /// The density per solid angle with which [`Shape::sample_primitive`] from `from` takes the direction `wi`,
+    /// which meets the primitive at `p` with the unit normal `ng`.
+    fn pdf_primitive(&self, prim: u32, from: Vec3, wi: Vec3, p: Vec3, ng: Vec3) -> f32;
+
+    /// The same geometry after `by`. Errors where the result cannot be represented.
+    fn transformed(&self, by: &DAffine3) -> Result<Arc<dyn Shape>>;
+
+    /// Bytes held.
+    fn memory(&self) -> u64;
+
+    /// For people: "mesh, 871414 triangles".
+    fn describe(&self) -> String;
+}

@@ -1,0 +1,179 @@
+//! A shaded surface point: where it is, how well that is known, and how a path goes on from it.
+
+use crate::base::geometry::Placement;
+use crate::base::hit::Hit;
+use crate::base::light::Receiver;
+use crate::base::ray::Ray;
+use crate::base::shape::{LocalRay, Surface};
+use crate::math::frame::Frame;
+use glam::{DMat3, DVec3, Vec2, Vec3};
+
+/// Half of f32's epsilon: the largest relative error of one rounding.
+const UNIT_ROUNDOFF: f64 = f32::EPSILON as f64 * 0.5;
+
+/// A surface point in render space.
+#[derive(Debug, Clone, Copy)]
+pub struct Vertex {
+    /// The point.
+    pub p: Vec3,
+    /// Bound on the distance between `p` and the surface as any kernel tests it, per axis.
+    pub error: Vec3,
+    /// Unit geometric normal, outward.
+    pub ng: Vec3,
+    /// Shading frame; its z is the unit shading normal, on the side of `ng`.
+    pub frame: Frame,
+    /// Unit direction back along the ray.
+    pub wo: Vec3,
+    /// Texture coordinates; (0, 0) where no material asks for them.
+    pub uv: Vec2,
+    /// Width of the ray's footprint in uv units; 0 where nothing asks.
+    pub footprint: f32,
+    /// Distance travelled by the ray, in lengths of its direction.
+    pub t: f32,
+    /// See [`Surface::lift`].
+    pub lift: Vec3,
+    /// The instance path of the leaf.
+    pub path: u64,
+    /// Primitive within the leaf.
+    pub prim: u32,
+    /// The leaf's object in the scene's table.
+    pub object: u32,
+}
+
+/// What a vertex is, beside its surface.
+#[derive(Debug, Clone, Copy)]
+pub struct Origin {
+    /// The kernel's hit.
+    pub hit: Hit,
+    /// The leaf's object.
+    pub object: u32,
+    /// Width of the ray per unit of distance.
+    pub spread: f32,
+}
+
+impl Vertex {
+    /// From a surface in the space of its group, the group's placement, and the ray that met it.
+    pub fn new(ray: &Ray, surface: &Surface, placement: Option<&Placement>, origin: Origin) -> Self {
+        let (p, error, ng, ns, lift) = match placement {
+            None => (surface.p, surface.error, surface.ng, surface.ns, surface.lift),
+            Some(pl) => placed(surface, pl),
+        };
+        let d = ray.d.as_dvec3();
+        let ng = ng.normalize();
+        let ns = ns.normalize();
+        let p32 = p.as_vec3();
+        // The rounding of p itself to f32.
+        let error = error + p.abs() * UNIT_ROUNDOFF;
+        let length = d.length();
+        let footprint = texture_footprint(surface, origin.spread as f64 * surface.t * length);
+        Vertex {
+            p: p32,
+            error: round_up(error),
+            ng: ng.as_vec3(),
+            frame: Frame::from_z(ns.as_vec3()),
+            wo: (-d / length).as_vec3(),
+            uv: surface.uv,
+            footprint,
+            t: surface.t as f32,
+            lift: lift.as_vec3(),
+            path: origin.hit.path,
+            prim: origin.hit.prim,
+            object: origin.object,
+        }
+    }
+
+    /// Where a ray in direction `w` starts: moved off the surface, to the side of `w`, by the bound on the error
+    /// of `p` (Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th ed., 6.8.6), never by a global epsilon.
+    #[inline]
+    pub fn spawn_origin(&self, w: Vec3) -> Vec3 {
+        let outward = w.dot(self.ng) >= 0.0;
+        let n = if outward { self.ng } else { -self.ng };
+        let distance = n.abs().dot(self.error);
+        let base = if outward { self.p + self.lift } else { self.p };
+        let o = base + n * distance;
+        // The sum was rounded, perhaps towards the surface: step once more, away from it.
+        Vec3::new(step(o.x, n.x), step(o.y, n.y), step(o.z, n.z))
+    }
+
+    /// A ray that leaves in direction `w`, without end.
+    #[inline]
+    pub fn spawn(&self, w: Vec3, key: u32) -> Ray {
+        Ray::new(self.spawn_origin(w), w, key)
+    }
+
+    /// A ray towards a point at `dist` along `w`, ending short of what stands there by a few roundings.
+    #[inline]
+    pub fn spawn_to(&self, w: Vec3, dist: f32, key: u32) -> Ray {
+        let o = self.spawn_origin(w);
+        // A relative 1e-5 is 80 roundings: more than the error of any sampled point at that distance, and too
+        // thin to hide a blocker.
+        Ray { o, d: w, tnear: 0.0, tfar: if dist.is_finite() { dist * (1.0 - 1e-5) } else { dist }, key }
+    }
+
+    /// This point as a light sees it: the side on which `wo` lies.
+    #[inline]
+    pub fn receiver(&self) -> Receiver {
+        let side = if self.wo.dot(self.ng) >= 0.0 { 1.0 } else { -1.0 };
+        Receiver { p: self.p, ng: self.ng * side, ns: self.frame.n * side }
+    }
+
+    /// Whether `wi` leaves on the side of the geometric surface on which `wo` lies.
+    #[inline]
+    pub fn same_side(&self, wi: Vec3) -> bool {
+        wi.dot(self.ng) * self.wo.dot(self.ng) > 0.0
+    }
+}
+
+/// The ray in the space of a placed group, without loss.
+pub fn local_ray(ray: &Ray, placement: Option<&Placement>) -> LocalRay {
+    let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
+    let (o, d) = match placement {
+        None => (o, d),
+        Some(p) => (p.from_render.transform_point3(o), p.from_render.transform_vector3(d)),
+    };
+    LocalRay { o, d, tnear: ray.tnear as f64, tfar: ray.tfar as f64 }
+}
+
+type PlacedSurface = (DVec3, DVec3, DVec3, DVec3, DVec3);
+
+/// Carries a surface through its placement. A kernel transforms rays in f32, so its idea of where the surface is
+/// is off by four roundings (three products, their sum) of |M^-1| |p| + |t|: that is carried back by |M| and added.
+fn placed(s: &Surface, pl: &Placement) -> PlacedSurface {
+    let m = pl.to_render.matrix3;
+    let p = pl.to_render.transform_point3(s.p);
+    let back = abs(pl.from_render.matrix3) * p.abs() + pl.from_render.translation.abs();
+    let error = abs(m) * (s.error + back * (4.0 * UNIT_ROUNDOFF * 1.01))
+        // ... and where a kernel maps its hit forward again.
+        + (abs(m) * s.p.abs() + pl.to_render.translation.abs()) * (4.0 * UNIT_ROUNDOFF * 1.01);
+    // Normals go by the inverse transpose; a mirroring placement keeps outward outward this way.
+    let normals = pl.from_render.matrix3.transpose();
+    (p, error, normals * s.ng, normals * s.ns, m * s.lift)
+}
+
+fn abs(m: DMat3) -> DMat3 {
+    DMat3::from_cols(m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs())
+}
+
+fn round_up(v: DVec3) -> Vec3 {
+    // One rounding up at most; 1 + 2 epsilon covers it.
+    v.as_vec3() * (1.0 + 2.0 * f32::EPSILON)
+}
+
+/// The neighbour of `x` on the side of `n`.
+#[inline]
+fn step(x: f32, n: f32) -> f32 {
+    if n > 0.0 {
+        x.next_up()
+    } else if n < 0.0 {
+        x.next_down()
+    } else {
+        x
+    }
+}
+
+/// Width of a ray's footprint in uv units: its width in space over the longer tangent. Isotropic and without the
+/// obliquity of the surface, so never wider than the truth.
+fn texture_footprint(s: &Surface, width: f64) -> f32 {
+    let scale = s.dpdu.length_squared().max(s.dpdv.length_squared());
+    if scale > 0.0 { (width / scale.sqrt()) as f32 } else { 0.0 }
+}
