@@ -9,5 +9,6 @@ pub mod math;
 pub mod render;
 pub mod sampler;
 pub mod sampling;
+pub mod scene;
 
 pub use error::{Error, Result};

@@ -1,0 +1,3 @@
+//! L3: the scene, as plain data and as built.
+
+pub mod desc;
