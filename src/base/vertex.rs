@@ -38,6 +38,8 @@ pub struct Vertex {
     pub prim: u32,
     /// The leaf's object in the scene's table.
     pub object: u32,
+    /// Which of the object's materials.
+    pub slot: u32,
 }
 
 /// What a vertex is, beside its surface.
@@ -47,6 +49,8 @@ pub struct Origin {
     pub hit: Hit,
     /// The leaf's object.
     pub object: u32,
+    /// Which of the object's materials.
+    pub slot: u32,
     /// Width of the ray per unit of distance.
     pub spread: f32,
 }
@@ -60,7 +64,10 @@ impl Vertex {
         };
         let d = ray.d.as_dvec3();
         let ng = ng.normalize();
-        let ns = ns.normalize();
+        let wo = -d / d.length();
+        // Seen from a side on which the interpolated normal turns away (at silhouettes), no frame around it has the
+        // viewer and the light on consistent sides: there the geometric normal stands in, and nothing turns black.
+        let ns = if ns.dot(wo) * ng.dot(wo) > 0.0 { ns.normalize() } else { ng };
         let p32 = p.as_vec3();
         // The rounding of p itself to f32.
         let error = error + p.abs() * UNIT_ROUNDOFF;
@@ -71,7 +78,7 @@ impl Vertex {
             error: round_up(error),
             ng: ng.as_vec3(),
             frame: Frame::from_z(ns.as_vec3()),
-            wo: (-d / length).as_vec3(),
+            wo: wo.as_vec3(),
             uv: surface.uv,
             footprint,
             t: surface.t as f32,
@@ -79,6 +86,7 @@ impl Vertex {
             path: origin.hit.path,
             prim: origin.hit.prim,
             object: origin.object,
+            slot: origin.slot,
         }
     }
 
@@ -117,10 +125,11 @@ impl Vertex {
         Receiver { p: self.p, ng: self.ng * side, ns: self.frame.n * side }
     }
 
-    /// Whether `wi` leaves on the side of the geometric surface on which `wo` lies.
+    /// Whether `wi` lies on the same side of the shading normal as of the geometric one. Where the two disagree,
+    /// light would leak through the surface: nothing is scattered there.
     #[inline]
-    pub fn same_side(&self, wi: Vec3) -> bool {
-        wi.dot(self.ng) * self.wo.dot(self.ng) > 0.0
+    pub fn is_consistent(&self, wi: Vec3) -> bool {
+        wi.dot(self.ng) * wi.dot(self.frame.n) > 0.0
     }
 }
 

@@ -105,8 +105,9 @@ pub struct ObjectDesc {
     pub name: String,
     /// What is placed.
     pub content: Content,
-    /// Name of its material; None takes the mesh's own materials, or the default.
-    pub material: Option<String>,
+    /// Names of its materials by slot (a mesh with a material library has several slots; whoever reads the library
+    /// adds its materials to the scene and lists them here). Empty takes the default material.
+    pub materials: Vec<String>,
     /// From object space to that of the group (for the root: to world space).
     pub transform: DAffine3,
     /// Where it stands.
