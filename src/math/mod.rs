@@ -1,4 +1,11 @@
 //! L0: geometry and exact arithmetic helpers.
 
 pub mod aabb;
+pub mod bounds;
 pub mod frame;
+pub mod quadric;
+pub mod simd;
+pub mod trig;
+
+pub use aabb::{Aabb, DAabb};
+pub use frame::Frame;

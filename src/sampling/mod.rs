@@ -1,1 +1,4 @@
 //! L0: warps and distributions.
+
+pub mod mis;
+pub mod warp;
