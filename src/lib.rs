@@ -10,5 +10,7 @@ pub mod render;
 pub mod sampler;
 pub mod sampling;
 pub mod scene;
+#[cfg(test)]
+mod testing;
 
 pub use error::{Error, Result};

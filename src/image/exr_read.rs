@@ -1,0 +1,215 @@
+//! OpenEXR pictures through the `exr` crate's block interface: only the wanted layer's largest level is
+//! decompressed, and only the wanted channels are kept.
+
+use super::picture::{Picture, SampleKind};
+use super::read::{DEFLATE_RATIO, check_size};
+use crate::base::image_data::{ImageData, Texels};
+use crate::error::{Error, Result};
+use exr::block::chunk::Chunk;
+use exr::block::reader::{ChunksReader, Reader};
+use exr::block::{BlockIndex, UncompressedBlock};
+use exr::meta::MetaData;
+use exr::meta::attribute::{AttributeValue, ChannelDescription, SampleType};
+use exr::meta::header::Header;
+use half::f16;
+use half::slice::HalfFloatSliceExt;
+use rayon::prelude::*;
+use std::io::Cursor;
+use std::path::Path;
+
+/// The colour channels of the first layer that has them: `R G B` (in any case), else `<prefix>.R .G .B`
+/// (a prefix that ends in `Combined`, as Blender's, goes first), else `Y` as gray.
+pub(super) fn decode_colour(path: &Path, bytes: &[u8]) -> Result<ImageData> {
+    let reader = open(path, bytes)?;
+    let choice = choose_colour(reader.headers()).ok_or_else(|| {
+        Error::content(path, format!("no channels R, G, B or Y; has: {}", names(reader.headers())))
+    })?;
+    let header = &reader.headers()[choice.layer];
+    let (width, height) = (header.layer_size.x(), header.layer_size.y());
+    check_layer(path, bytes, header)?;
+    let mut texels = vec![[0f32; 3]; width * height];
+    decode_layer(path, reader, choice.layer, |channel, at, values| {
+        for (component, &wanted) in choice.channels.iter().enumerate() {
+            if wanted == channel {
+                texels[at..at + values.len()].iter_mut().zip(values).for_each(|(t, &v)| t[component] = v);
+            }
+        }
+    })?;
+    Ok(ImageData { width, height, texels: Texels::F32(texels) })
+}
+
+/// Every channel of the first layer, with text attributes as metadata.
+pub(super) fn decode_planes(path: &Path, bytes: &[u8]) -> Result<Picture> {
+    let reader = open(path, bytes)?;
+    let header = &reader.headers()[0];
+    check_layer(path, bytes, header)?;
+    let (width, height) = (header.layer_size.x(), header.layer_size.y());
+    let mut picture = Picture::new(width, height);
+    picture.set_frame_from(header);
+    for channel in &header.channels.list {
+        let kind = if channel.sample_type == SampleType::F16 { SampleKind::Half } else { SampleKind::Float };
+        picture.push(channel.name.to_string(), kind, vec![0.0; width * height]);
+    }
+    decode_layer(path, reader, 0, |channel, at, values| {
+        picture.planes[channel].data[at..at + values.len()].copy_from_slice(values);
+    })?;
+    Ok(picture)
+}
+
+impl Picture {
+    fn set_frame_from(&mut self, header: &Header) {
+        let display = header.shared_attributes.display_window;
+        let position = header.own_attributes.layer_position;
+        let offset = [position.x() - display.position.x(), position.y() - display.position.y()];
+        let size = [self.width, self.height];
+        for axis in 0..2 {
+            // A data window that reaches over the display window keeps its pixels and becomes the frame.
+            self.origin[axis] = usize::try_from(offset[axis]).unwrap_or(0);
+            let shown = if axis == 0 { display.size.x() } else { display.size.y() };
+            self.frame[axis] = shown.max(self.origin[axis] + size[axis]);
+        }
+        let texts = header.own_attributes.other.iter().chain(&header.shared_attributes.other);
+        for (key, value) in texts {
+            if let AttributeValue::Text(text) = value {
+                self.metadata.push((key.to_string(), text.to_string()));
+            }
+        }
+        self.metadata.sort();
+    }
+}
+
+fn open<'a>(path: &Path, bytes: &'a [u8]) -> Result<Reader<Cursor<&'a [u8]>>> {
+    exr::block::read(Cursor::new(bytes), false).map_err(|e| damaged(path, e))
+}
+
+fn damaged(path: &Path, e: impl std::fmt::Display) -> Error {
+    Error::content(path, format!("EXR picture that cannot be read: {e}"))
+}
+
+fn names(headers: &[Header]) -> String {
+    let all: Vec<String> =
+        headers.iter().flat_map(|h| h.channels.list.iter()).take(20).map(|c| c.name.to_string()).collect();
+    all.join(", ")
+}
+
+struct ColourChoice {
+    layer: usize,
+    /// Channel indices of red, green and blue.
+    channels: [usize; 3],
+}
+
+fn choose_colour(headers: &[Header]) -> Option<ColourChoice> {
+    let find = |header: &Header, name: &str| {
+        header.channels.list.iter().position(|c| c.name.to_string().eq_ignore_ascii_case(name))
+    };
+    let triple = |header: &Header, prefix: &str| -> Option<[usize; 3]> {
+        let at = |c| find(header, &format!("{prefix}{c}"));
+        Some([at("R")?, at("G")?, at("B")?])
+    };
+    let in_any = |choose: &dyn Fn(&Header) -> Option<[usize; 3]>| {
+        headers
+            .iter()
+            .enumerate()
+            .find_map(|(layer, h)| choose(h).map(|channels| ColourChoice { layer, channels }))
+    };
+    let prefixes = |h: &Header| -> Vec<String> {
+        h.channels
+            .list
+            .iter()
+            .filter_map(|c| c.name.to_string().strip_suffix(".R").map(|p| p.to_owned() + "."))
+            .collect()
+    };
+    in_any(&|h| triple(h, ""))
+        .or_else(|| {
+            in_any(&|h| prefixes(h).iter().filter(|p| p.ends_with("Combined.")).find_map(|p| triple(h, p)))
+        })
+        .or_else(|| in_any(&|h| prefixes(h).iter().find_map(|p| triple(h, p))))
+        .or_else(|| in_any(&|h| find(h, "Y").map(|c| [c; 3])))
+}
+
+fn check_layer(path: &Path, bytes: &[u8], header: &Header) -> Result<()> {
+    let (width, height) = (header.layer_size.x() as u64, header.layer_size.y() as u64);
+    let per_pixel = header.channels.bytes_per_pixel.max(1) as u64;
+    check_size(path, width, height, bytes.len(), DEFLATE_RATIO.div_ceil(per_pixel))?;
+    let subsampled = |c: &&ChannelDescription| c.sampling.x() != 1 || c.sampling.y() != 1;
+    if let Some(channel) = header.channels.list.iter().find(subsampled) {
+        return Err(damaged(
+            path,
+            format!("channel {} is subsampled (luminance-chroma files are not supported)", channel.name),
+        ));
+    }
+    if header.shared_attributes.chromaticities.is_some_and(|c| !is_rec709(&c)) {
+        log::warn!("{}: its primaries are not Rec. 709; its values are used as if they were", path.display());
+    }
+    Ok(())
+}
+
+fn is_rec709(c: &exr::meta::attribute::Chromaticities) -> bool {
+    // ITU-R BT.709-6, items 1.3 and 1.4.
+    let known = [(c.red, 0.64, 0.33), (c.green, 0.30, 0.60), (c.blue, 0.15, 0.06), (c.white, 0.3127, 0.3290)];
+    known.iter().all(|(p, x, y)| (p.x() - x).abs() < 1e-3 && (p.y() - y).abs() < 1e-3)
+}
+
+/// Decompresses the largest level of one layer on all threads and hands `line` each run of samples: channel,
+/// index of its first pixel in the picture, values.
+fn decode_layer(
+    path: &Path,
+    reader: Reader<Cursor<&[u8]>>,
+    layer: usize,
+    mut line: impl FnMut(usize, usize, &[f32]),
+) -> Result<()> {
+    let wanted = |_: &MetaData, _, block: BlockIndex| {
+        block.layer == layer && block.level.x() == 0 && block.level.y() == 0
+    };
+    let mut chunks = reader.filter_chunks(false, wanted).map_err(|e| damaged(path, e))?;
+    let meta = chunks.meta_data().clone();
+    let channels = &meta.headers[layer].channels;
+    let width = meta.headers[layer].layer_size.x();
+    let mut values = Vec::new();
+    let batch_size = 4 * rayon::current_num_threads();
+    loop {
+        let batch: Vec<Chunk> = chunks
+            .by_ref()
+            .take(batch_size)
+            .collect::<exr::error::Result<_>>()
+            .map_err(|e| damaged(path, e))?;
+        if batch.is_empty() {
+            return Ok(());
+        }
+        let blocks: Vec<UncompressedBlock> = batch
+            .into_par_iter()
+            .map(|chunk| UncompressedBlock::decompress_chunk(chunk, &meta, false))
+            .collect::<exr::error::Result<_>>()
+            .map_err(|e| damaged(path, e))?;
+        for block in blocks {
+            if block.index.layer != layer
+                || block.data.len() < block.index.pixel_size.area() * channels.bytes_per_pixel
+            {
+                return Err(damaged(path, "a chunk is not where the offset table says"));
+            }
+            for run in block.lines(channels) {
+                let at = run.location;
+                to_floats(channels.list[at.channel].sample_type, run.value, &mut values);
+                line(at.channel, at.position.y() * width + at.position.x(), &values);
+            }
+        }
+    }
+}
+
+/// Native-endian samples to floats.
+fn to_floats(kind: SampleType, bytes: &[u8], out: &mut Vec<f32>) {
+    out.clear();
+    match kind {
+        SampleType::F16 => {
+            let halfs: Vec<f16> = bytes.chunks_exact(2).map(|b| f16::from_ne_bytes([b[0], b[1]])).collect();
+            out.resize(halfs.len(), 0.0);
+            halfs.convert_to_f32_slice(out);
+        }
+        SampleType::F32 => {
+            out.extend(bytes.chunks_exact(4).map(|b| f32::from_ne_bytes([b[0], b[1], b[2], b[3]])))
+        }
+        SampleType::U32 => {
+            out.extend(bytes.chunks_exact(4).map(|b| u32::from_ne_bytes([b[0], b[1], b[2], b[3]]) as f32));
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! Reads PNG, JPEG, Radiance HDR and EXR pictures. The format is told by content, not by file name.
+//!
+//! Every size is checked by header before anything of that size is allocated: against absolute caps, and
+//! against what a file of that length can hold at the format's best compression.
+
+use super::picture::{Picture, SampleKind};
+use super::{exr_read, hdr};
+use crate::base::image_data::{Encoding, ImageData, Texels};
+use crate::color::srgb_to_linear;
+use crate::error::{Error, Result};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, Limits};
+use std::io::Cursor;
+use std::path::Path;
+
+/// Longest side that is read, in pixels.
+pub const MAX_SIDE: u64 = 65_536;
+
+/// Most pixels that are read from one file (a 32768 x 8192 sky).
+pub const MAX_PIXELS: u64 = 1 << 28;
+
+/// Deflate packs at most 1032 bytes into one (RFC 1951: a 258-byte match in two bits).
+pub(super) const DEFLATE_RATIO: u64 = 1032;
+
+/// A JPEG block of 64 pixels costs at least one bit (the DC difference of a progressive gray picture).
+const JPEG_PIXELS_PER_BYTE: u64 = 512;
+
+/// Reads a picture as linear Rec. 709 texels.
+///
+/// `encoding` says how 8-bit and 16-bit values are to be understood (sRGB when `None`); 8-bit files stay
+/// 8-bit, 16-bit files become floats. HDR and EXR are linear whatever it says. Values that are not finite or
+/// negative are repaired: NaN, negative values and -infinity become 0, +infinity the largest finite value of
+/// the picture; a warning counts them. Alpha is kept for 8-bit files alone.
+///
+/// # Errors
+/// A file that cannot be opened; that is no picture of a known format; that claims more pixels than its length
+/// can hold, or more than [`MAX_PIXELS`] or [`MAX_SIDE`]; that is damaged or cut short.
+pub fn read_image(path: &Path, encoding: Option<Encoding>) -> Result<ImageData> {
+    let bytes = std::fs::read(path).map_err(|e| Error::file(path, "open", e))?;
+    decode_image(path, &bytes, encoding)
+}
+
+/// As [`read_image`], from the bytes of a file; `path` is for messages alone.
+///
+/// # Errors
+/// As [`read_image`].
+pub fn decode_image(path: &Path, bytes: &[u8], encoding: Option<Encoding>) -> Result<ImageData> {
+    let encoding = encoding.unwrap_or_default();
+    match sniff(path, bytes)? {
+        Format::Png => decode_with_image(path, bytes, ImageFormat::Png, encoding),
+        Format::Jpeg => decode_with_image(path, bytes, ImageFormat::Jpeg, encoding),
+        Format::Hdr => hdr::decode(path, bytes),
+        Format::Exr => exr_read::decode_colour(path, bytes).map(|image| finish(path, image)),
+    }
+}
+
+/// Reads a picture as named planes: all channels of the first layer of an EXR file, exactly as stored (NaN
+/// and infinities too), or linear `R`, `G`, `B` of any other format.
+///
+/// # Errors
+/// As [`read_image`].
+pub fn read_planes(path: &Path) -> Result<Picture> {
+    let bytes = std::fs::read(path).map_err(|e| Error::file(path, "open", e))?;
+    if sniff(path, &bytes)? == Format::Exr {
+        return exr_read::decode_planes(path, &bytes);
+    }
+    let image = decode_image(path, &bytes, None)?;
+    let mut picture = Picture::new(image.width, image.height);
+    let texels: Vec<_> = (0..image.height)
+        .flat_map(|y| (0..image.width).map(move |x| (x, y)))
+        .map(|(x, y)| image.texel(x, y))
+        .collect();
+    picture.push("R", SampleKind::Float, texels.iter().map(|t| t.r).collect());
+    picture.push("G", SampleKind::Float, texels.iter().map(|t| t.g).collect());
+    picture.push("B", SampleKind::Float, texels.iter().map(|t| t.b).collect());
+    Ok(picture)
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Format {
+    Png,
+    Jpeg,
+    Hdr,
+    Exr,
+}
+
+fn sniff(path: &Path, bytes: &[u8]) -> Result<Format> {
+    let known: [(&[u8], Format); 5] = [
+        (b"\x89PNG\r\n\x1a\n", Format::Png),
+        (b"\xff\xd8\xff", Format::Jpeg),
+        (b"#?RADIANCE", Format::Hdr),
+        (b"#?RGBE", Format::Hdr),
+        (b"\x76\x2f\x31\x01", Format::Exr),
+    ];
+    known.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|&(_, format)| format).ok_or_else(|| {
+        let what = if bytes.is_empty() { "the file is empty" } else { "not a picture of a known format" };
+        Error::content(path, format!("{what}; known: PNG, JPEG, Radiance HDR, EXR"))
+    })
+}
+
+/// Refuses sizes that are zero, above the caps, or more than `len` bytes can hold when the best the format can
+/// do is `pixels_per_byte` (64 KiB are granted on top, so that no small honest file is refused).
+pub(super) fn check_size(
+    path: &Path,
+    width: u64,
+    height: u64,
+    len: usize,
+    pixels_per_byte: u64,
+) -> Result<()> {
+    let pixels = width.saturating_mul(height);
+    let message = if pixels == 0 {
+        "has no pixels".to_owned()
+    } else if width > MAX_SIDE || height > MAX_SIDE || pixels > MAX_PIXELS {
+        format!("the largest that is read is {MAX_SIDE} a side and {MAX_PIXELS} in all")
+    } else if pixels > (1 << 16) + (len as u64).saturating_mul(pixels_per_byte) {
+        format!("more than its {len} bytes can hold")
+    } else {
+        return Ok(());
+    };
+    Err(Error::content(path, format!("claims {width} x {height} pixels: {message}")))
+}
+
+fn decode_with_image(
+    path: &Path,
+    bytes: &[u8],
+    format: ImageFormat,
+    encoding: Encoding,
+) -> Result<ImageData> {
+    let fail = |e: image::ImageError| Error::content(path, format!("damaged picture: {e}"));
+    let mut reader = image::ImageReader::with_format(Cursor::new(bytes), format);
+    let mut limits = Limits::default();
+    // The decoded picture (at most 8 bytes a pixel) and the decoder's own rows.
+    limits.max_alloc = Some(MAX_PIXELS * 12);
+    limits.max_image_width = None;
+    limits.max_image_height = None;
+    reader.limits(limits);
+    let decoder = reader.into_decoder().map_err(fail)?;
+    let (width, height) = decoder.dimensions();
+    let per_byte = match format {
+        // One-bit pixels are the densest.
+        ImageFormat::Png => DEFLATE_RATIO * 8,
+        _ => JPEG_PIXELS_PER_BYTE,
+    };
+    check_size(path, width.into(), height.into(), bytes.len(), per_byte)?;
+    let deep = matches!(
+        decoder.color_type(),
+        ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16
+    );
+    let picture = DynamicImage::from_decoder(decoder).map_err(fail)?;
+    let texels = if deep { texels16(&picture, encoding) } else { texels8(picture, encoding) };
+    Ok(ImageData { width: width as usize, height: height as usize, texels })
+}
+
+fn texels8(picture: DynamicImage, encoding: Encoding) -> Texels {
+    let bytes = picture.into_rgba8().into_raw();
+    // Reuses the allocation where its alignment allows (it always does: bytes to byte arrays).
+    let quads = bytemuck::allocation::try_cast_vec::<u8, [u8; 4]>(bytes)
+        .unwrap_or_else(|(_, bytes)| bytes.chunks_exact(4).map(|c| [c[0], c[1], c[2], c[3]]).collect());
+    match encoding {
+        Encoding::Srgb => Texels::Srgb8(quads),
+        Encoding::Linear => Texels::Linear8(quads),
+    }
+}
+
+fn texels16(picture: &DynamicImage, encoding: Encoding) -> Texels {
+    let curve: Vec<f32> = (0..=u16::MAX)
+        .map(|v| f32::from(v) / 65535.0)
+        .map(|v| if encoding == Encoding::Srgb { srgb_to_linear(v) } else { v })
+        .collect();
+    let value = |v: u16| curve[usize::from(v)];
+    let texels = match picture {
+        DynamicImage::ImageLuma16(i) => i.pixels().map(|p| [value(p.0[0]); 3]).collect(),
+        DynamicImage::ImageLumaA16(i) => i.pixels().map(|p| [value(p.0[0]); 3]).collect(),
+        DynamicImage::ImageRgba16(i) => i.pixels().map(|p| [p.0[0], p.0[1], p.0[2]].map(value)).collect(),
+        other => other.to_rgb16().pixels().map(|p| p.0.map(value)).collect(),
+    };
+    Texels::F32(texels)
+}
+
+/// Repairs values that are not finite or negative (see [`read_image`]) and says how many.
+fn finish(path: &Path, mut image: ImageData) -> ImageData {
+    let Texels::F32(texels) = &mut image.texels else { return image };
+    let values = texels.as_flattened_mut();
+    let bad = values.iter().filter(|v| !v.is_finite() || **v < 0.0).count();
+    if bad == 0 {
+        return image;
+    }
+    let largest = values.iter().copied().filter(|v| v.is_finite()).fold(0.0, f32::max);
+    for v in values.iter_mut().filter(|v| !v.is_finite() || **v < 0.0) {
+        *v = if *v == f32::INFINITY { largest } else { 0.0 };
+    }
+    log::warn!(
+        "{}: {bad} of {} values were negative or not finite; +infinity became {largest}, the others 0",
+        path.display(),
+        values.len()
+    );
+    image
+}
+
+#[cfg(test)]
+mod tests;
