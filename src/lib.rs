@@ -11,6 +11,6 @@ pub mod sampler;
 pub mod sampling;
 pub mod scene;
 #[cfg(test)]
-mod testing;
+pub mod testing;
 
 pub use error::{Error, Result};
