@@ -12,5 +12,6 @@ pub mod sampling;
 pub mod scene;
 #[cfg(test)]
 pub mod testing;
+pub mod textures;
 
 pub use error::{Error, Result};

@@ -3,6 +3,7 @@
 
 mod chi_square;
 mod quadrature;
+pub mod rows;
 
 use std::path::PathBuf;
 

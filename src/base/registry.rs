@@ -28,6 +28,8 @@ pub enum ParamKind {
     },
     /// Three numbers.
     Vector,
+    /// Two numbers, or one for both.
+    Vector2,
     /// Three numbers of at least 0, or one for all, linear Rec. 709.
     Color,
     /// A colour, or a table that describes a texture.
@@ -174,6 +176,16 @@ impl Params {
         }
     }
 
+    /// Two numbers (one stands for both), or `default`.
+    pub fn vector2_or(&self, name: &str, default: [f64; 2]) -> Result<[f64; 2]> {
+        match self.get(name) {
+            None => Ok(default),
+            Some(Value::Number(v)) if v.is_finite() => Ok([*v; 2]),
+            Some(Value::Numbers(v)) if v.len() == 2 && v.iter().all(|x| x.is_finite()) => Ok([v[0], v[1]]),
+            Some(_) => Err(self.error(name, "takes two finite numbers, or one for both")),
+        }
+    }
+
     /// Three numbers that must be given.
     pub fn vector(&self, name: &str) -> Result<[f64; 3]> {
         self.get(name).ok_or_else(|| self.missing(name))?;
@@ -314,6 +326,7 @@ fn check_range(spec: &ParamSpec, params: &Params) -> Result<()> {
             v => Err(params.error(name, format!("takes a whole number from {min} to {max}, not {v}"))),
         },
         ParamKind::Vector => params.vector(name).map(drop),
+        ParamKind::Vector2 => params.vector2_or(name, [0.0; 2]).map(drop),
         ParamKind::Color => params.color_or(name, [0.0; 3]).map(drop),
         ParamKind::Texture => match params.get(name) {
             Some(Value::Texture(_) | Value::Node(_)) => Ok(()),

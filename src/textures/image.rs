@@ -1,0 +1,384 @@
+//! A picture over the unit square of uv.
+
+use crate::base::image_data::{ImageData, LINEAR8_TO_LINEAR, SRGB8_TO_LINEAR, Texels};
+use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
+use crate::base::texture::Texture;
+use crate::color::Rgb;
+use crate::error::Result;
+use crate::textures::mip;
+use glam::Vec2;
+use std::sync::{Arc, OnceLock};
+
+const MAX_SCALE: f64 = 1e6;
+
+pub(super) const ROW: Row<dyn Texture> = Row {
+    kind: "image",
+    doc: "a picture over the unit square of uv, its first row at v = 1",
+    params: &[
+        ParamSpec { name: "path", kind: ParamKind::Image, default: None, doc: "the picture's file" },
+        ParamSpec {
+            name: "filter",
+            kind: ParamKind::Choice(&["bilinear", "trilinear"]),
+            default: Some("bilinear"),
+            doc: "trilinear also averages over the ray's footprint, for a third more memory",
+        },
+        ParamSpec {
+            name: "wrap",
+            kind: ParamKind::Choice(&["repeat", "clamp", "mirror"]),
+            default: Some("repeat"),
+            doc: "what lies beyond the unit square",
+        },
+        ParamSpec {
+            name: "encoding",
+            kind: ParamKind::Choice(&["srgb", "linear"]),
+            default: Some("srgb"),
+            doc: "how 8-bit values are to be read; floats are linear always",
+        },
+        ParamSpec {
+            name: "uv_scale",
+            kind: ParamKind::Vector2,
+            default: Some("1"),
+            doc: "copies per unit of u and of v; negative flips, 0 is refused; up to 1e6",
+        },
+        ParamSpec {
+            name: "uv_offset",
+            kind: ParamKind::Vector2,
+            default: Some("0"),
+            doc: "added to uv after the scale; up to 1e6",
+        },
+    ],
+    build: |p| Ok(Arc::new(ImageTexture::from_params(p)?)),
+    samples,
+};
+
+fn samples() -> Vec<Params> {
+    let bytes = |w: usize, h: usize| -> Vec<[u8; 4]> {
+        (0..w * h).map(|i| [i * 71 % 256, i * 37 % 256, i * 113 % 256, 255].map(|v| v as u8)).collect()
+    };
+    let image = |width, height, texels| Value::Image(Arc::new(ImageData { width, height, texels }));
+    let floats = (0..35).map(|i| [i as f32, 0.25, (i * i % 7) as f32]).collect();
+    vec![
+        Params::new().with("path", image(5, 3, Texels::Srgb8(bytes(5, 3)))),
+        Params::new()
+            .with("path", image(6, 7, Texels::Linear8(bytes(6, 7))))
+            .with("wrap", Value::Text("mirror".into()))
+            .with("uv_scale", Value::Numbers(vec![-2.25, 1.5]))
+            .with("uv_offset", Value::Numbers(vec![0.4, -3.3])),
+        Params::new()
+            .with("path", image(7, 5, Texels::F32(floats)))
+            .with("filter", Value::Text("trilinear".into()))
+            .with("wrap", Value::Text("clamp".into()))
+            .with("uv_scale", Value::Number(1.75))
+            .with("uv_offset", Value::Number(-0.5)),
+        Params::new()
+            .with("path", image(1, 1, Texels::Srgb8(vec![[255, 128, 0, 0]])))
+            .with("encoding", Value::Text("linear".into())),
+    ]
+}
+
+/// What lies beyond the unit square.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Wrap {
+    Repeat,
+    Clamp,
+    Mirror,
+}
+
+/// Two neighbouring texels along an axis and the weight of the second.
+struct Tap {
+    i0: usize,
+    i1: usize,
+    f: f32,
+}
+
+/// `x.floor()` without a library call where the target has no instruction for it; exact for |x| < 2^31.
+#[inline]
+fn floor(x: f32) -> f32 {
+    let t = x as i32 as f32;
+    if t > x { t - 1.0 } else { t }
+}
+
+impl Wrap {
+    /// The texels around `s`, of `n` that span [0, 1]. Any `s` is allowed, even NaN, which counts as 0.
+    #[inline]
+    fn tap(self, s: f32, n: usize) -> Tap {
+        let s = match self {
+            Wrap::Repeat => s - floor(s),
+            Wrap::Clamp => s,
+            Wrap::Mirror => (s - 2.0 * floor(0.5 * s + 0.5)).abs(),
+        };
+        // `max` turns NaN into 0, where `clamp` would keep it.
+        let x = (s.max(0.0) * n as f32).min(n as f32) - 0.5;
+        let low = floor(x);
+        let i = low as i32;
+        let last = n - 1;
+        let (before, after) = if self == Wrap::Repeat { (last, 0) } else { (0, last) };
+        Tap {
+            i0: if i < 0 { before } else { (i as usize).min(last) },
+            i1: if i >= last as i32 { after } else { (i + 1) as usize },
+            f: x - low,
+        }
+    }
+
+    /// Adds to `weights` what each of the texels that span [0, 1] contributes to the integral from `a` to `b`.
+    fn integrate(self, a: f64, b: f64, weights: &mut [f64]) {
+        let n = weights.len();
+        // Between the centres of neighbours the filter is linear, so that the middle of a stretch stands for all
+        // of it; whole periods count each texel alike.
+        let (mut a, mut b) = (a, b);
+        match self {
+            Wrap::Repeat | Wrap::Mirror => {
+                let period = if self == Wrap::Repeat { 1.0 } else { 2.0 };
+                let whole = ((b - a) / period).floor() * period;
+                weights.iter_mut().for_each(|w| *w += whole / n as f64);
+                b -= whole;
+                let shift = (a / period).floor() * period;
+                (a, b) = (a - shift, b - shift);
+            }
+            Wrap::Clamp => {
+                weights[0] += (b.min(0.0) - a).max(0.0);
+                weights[n - 1] += (b - a.max(1.0)).max(0.0);
+                (a, b) = (a.clamp(0.0, 1.0), b.clamp(0.0, 1.0));
+            }
+        }
+        let mut from = a;
+        while from < b {
+            let next = ((from * n as f64 - 0.5).floor() + 1.5) / n as f64;
+            let to = if next > from { next.min(b) } else { b };
+            let tap = self.tap((0.5 * (from + to)) as f32, n);
+            weights[tap.i0] += (to - from) * (1.0 - tap.f as f64);
+            weights[tap.i1] += (to - from) * tap.f as f64;
+            from = to;
+        }
+    }
+}
+
+/// A picture with the curve that decodes its bytes.
+struct Level {
+    image: Arc<ImageData>,
+    curve: &'static [f32; 256],
+}
+
+impl Level {
+    #[inline]
+    fn bilinear(&self, s: Vec2, wrap: Wrap) -> Rgb {
+        let (w, h) = (self.image.width, self.image.height);
+        let x = wrap.tap(s.x, w);
+        let y = wrap.tap(s.y, h);
+        // The top row comes first, and v points up.
+        let (r0, r1) = ((h - 1 - y.i0) * w, (h - 1 - y.i1) * w);
+        let i = [r0 + x.i0, r0 + x.i1, r1 + x.i0, r1 + x.i1];
+        let [a, b, c, d] = match &self.image.texels {
+            Texels::Srgb8(t) | Texels::Linear8(t) => {
+                i.map(|i| Rgb::from([0, 1, 2].map(|c| self.curve[t[i][c] as usize])))
+            }
+            Texels::F32(t) => i.map(|i| Rgb::from(t[i])),
+        };
+        a.lerp(b, x.f).lerp(c.lerp(d, x.f), y.f)
+    }
+}
+
+struct ImageTexture {
+    /// The picture, then each half the size of the one before; one alone unless trilinear.
+    levels: Vec<Level>,
+    wrap: Wrap,
+    scale: Vec2,
+    offset: Vec2,
+    mean: OnceLock<Rgb>,
+}
+
+impl ImageTexture {
+    fn from_params(p: &Params) -> Result<Self> {
+        let image = p.image("path")?;
+        let texels = match &image.texels {
+            Texels::Srgb8(t) | Texels::Linear8(t) => t.len(),
+            Texels::F32(t) => t.len(),
+        };
+        if texels == 0 || image.width.checked_mul(image.height) != Some(texels) {
+            return Err(p.error("path", "holds no whole picture"));
+        }
+        let curve = match (p.text_or("encoding", "")?, &image.texels) {
+            ("linear", _) | ("", Texels::Linear8(_)) => &*LINEAR8_TO_LINEAR,
+            _ => &*SRGB8_TO_LINEAR,
+        };
+        let wrap = match p.text_or("wrap", "repeat")? {
+            "clamp" => Wrap::Clamp,
+            "mirror" => Wrap::Mirror,
+            _ => Wrap::Repeat,
+        };
+        let mut levels = vec![Level { image: image.clone(), curve }];
+        if p.text_or("filter", "bilinear")? == "trilinear" {
+            levels.extend(mip::chain(&image, curve).into_iter().map(|image| Level { image, curve }));
+        }
+        let pair = |name: &str, default: f64| -> Result<Vec2> {
+            let v = p.vector2_or(name, [default; 2])?;
+            if v.iter().any(|s| s.abs() > MAX_SCALE) {
+                return Err(p.error(name, format!("is outside {} to {MAX_SCALE}", -MAX_SCALE)));
+            }
+            Ok(Vec2::new(v[0] as f32, v[1] as f32))
+        };
+        let (scale, offset) = (pair("uv_scale", 1.0)?, pair("uv_offset", 0.0)?);
+        if scale.x == 0.0 || scale.y == 0.0 {
+            return Err(p.error("uv_scale", "must not be 0"));
+        }
+        Ok(ImageTexture { levels, wrap, scale, offset, mean: OnceLock::new() })
+    }
+
+    /// The exact integral of the filtered picture over the unit square of uv.
+    fn integral(&self) -> Rgb {
+        let axis = |scale: f32, offset: f32, n: usize| {
+            let (a, b) = (offset as f64, offset as f64 + scale as f64);
+            let mut weights = vec![0.0; n];
+            self.wrap.integrate(a.min(b), a.max(b), &mut weights);
+            weights.iter_mut().for_each(|w| *w /= scale.abs() as f64);
+            weights
+        };
+        let level = &self.levels[0];
+        let (w, h) = (level.image.width, level.image.height);
+        let columns = axis(self.scale.x, self.offset.x, w);
+        let rows = axis(self.scale.y, self.offset.y, h);
+        let mut sum = [0f64; 3];
+        for (y, row) in rows.iter().rev().enumerate() {
+            for (x, column) in columns.iter().enumerate() {
+                let i = y * w + x;
+                let texel = match &level.image.texels {
+                    Texels::Srgb8(t) | Texels::Linear8(t) => [0, 1, 2].map(|c| level.curve[t[i][c] as usize]),
+                    Texels::F32(t) => t[i],
+                };
+                sum.iter_mut().zip(texel).for_each(|(s, v)| *s += row * column * v as f64);
+            }
+        }
+        Rgb::from(sum.map(|s| s as f32))
+    }
+}
+
+impl Texture for ImageTexture {
+    fn eval(&self, uv: Vec2, footprint: f32) -> Rgb {
+        let s = uv * self.scale + self.offset;
+        let last = self.levels.len() - 1;
+        if last == 0 || footprint <= 0.0 {
+            return self.levels[0].bilinear(s, self.wrap);
+        }
+        // Williams, "Pyramidal Parametrics", SIGGRAPH 1983: the level whose texels are as wide as the footprint.
+        let base = &self.levels[0].image;
+        let texels = (self.scale.abs() * Vec2::new(base.width as f32, base.height as f32)).max_element();
+        let level = (footprint * texels).max(1.0).log2().min(last as f32);
+        let (low, f) = (level as usize, level.fract());
+        let fine = self.levels[low].bilinear(s, self.wrap);
+        if f == 0.0 {
+            return fine;
+        }
+        fine.lerp(self.levels[low + 1].bilinear(s, self.wrap), f)
+    }
+
+    fn uses_footprint(&self) -> bool {
+        self.levels.len() > 1
+    }
+
+    fn mean(&self) -> Rgb {
+        *self.mean.get_or_init(|| self.integral())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn texture(extra: &[(&str, Value)]) -> Arc<dyn Texture> {
+        // Top row: red, green; bottom row: blue, white.
+        let texels = vec![[255, 0, 0, 0], [0, 255, 0, 0], [0, 0, 255, 0], [255, 255, 255, 0]];
+        let image = Arc::new(ImageData { width: 2, height: 2, texels: Texels::Srgb8(texels) });
+        let params = Params::new().with("path", Value::Image(image));
+        (ROW.build)(&extra.iter().fold(params, |p, (n, v)| p.with(n, v.clone()))).expect("builds")
+    }
+
+    #[test]
+    fn v_points_up_and_texel_centres_are_exact() {
+        let t = texture(&[]);
+        let at = |u, v| t.eval(Vec2::new(u, v), 0.0).to_array();
+        assert_eq!(at(0.25, 0.75), [1.0, 0.0, 0.0]);
+        assert_eq!(at(0.75, 0.75), [0.0, 1.0, 0.0]);
+        assert_eq!(at(0.25, 0.25), [0.0, 0.0, 1.0]);
+        assert_eq!(at(0.75, 0.25), [1.0, 1.0, 1.0]);
+        assert_eq!(at(0.5, 0.75), [0.5, 0.5, 0.0]);
+        assert_eq!(at(0.5, 0.5), [0.5, 0.5, 0.5]);
+    }
+
+    #[test]
+    fn the_unit_square_is_continued_as_asked() {
+        let word = |w: &str| ("wrap", Value::Text(w.into()));
+        let red = [1.0, 0.0, 0.0];
+        let at = |t: &Arc<dyn Texture>, u, v| t.eval(Vec2::new(u, v), 0.0).to_array();
+        let t = texture(&[word("repeat")]);
+        assert_eq!(at(&t, 3.25, -5.25), red);
+        assert_eq!(at(&t, 0.0, 0.75), [0.5, 0.5, 0.0], "the seam blends the ends");
+        let t = texture(&[word("clamp")]);
+        assert_eq!(at(&t, -3.0, 7.0), red);
+        assert_eq!(at(&t, 0.0, 0.75), red);
+        let t = texture(&[word("mirror")]);
+        assert_eq!(at(&t, -0.25, 0.75), red);
+        assert_eq!(at(&t, 2.25, 1.25), red);
+        assert_eq!(at(&t, 1.25, 0.75), [0.0, 1.0, 0.0]);
+    }
+
+    #[test]
+    fn scale_and_offset_move_the_picture() {
+        let pair = |a, b| Value::Numbers(vec![a, b]);
+        let t = texture(&[("uv_scale", pair(-1.0, 2.0)), ("uv_offset", pair(0.5, 0.25))]);
+        // (0.25, 0.25) -> (0.25, 0.75)
+        assert_eq!(t.eval(Vec2::new(0.25, 0.25), 0.0).to_array(), [1.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn encodings_differ_where_they_should() {
+        let grey = |extra: Option<&str>, texels| {
+            let image = ImageData { width: 1, height: 1, texels };
+            let mut p = Params::new().with("path", Value::Image(Arc::new(image)));
+            if let Some(e) = extra {
+                p = p.with("encoding", Value::Text(e.into()));
+            }
+            (ROW.build)(&p).expect("builds").mean().r
+        };
+        let bytes = vec![[128; 4]];
+        // IEC 61966-2-1: code 128 is linear 0.2158605.
+        for (encoding, texels, want) in [
+            (None, Texels::Srgb8(bytes.clone()), 0.2158605),
+            (None, Texels::Linear8(bytes.clone()), 128.0 / 255.0),
+            (Some("linear"), Texels::Srgb8(bytes.clone()), 128.0 / 255.0),
+            (Some("srgb"), Texels::Linear8(bytes), 0.2158605),
+            (Some("srgb"), Texels::F32(vec![[2.5; 3]]), 2.5),
+        ] {
+            assert!((grey(encoding, texels) - want).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn the_chain_keeps_the_mean_of_odd_sizes() {
+        for (width, height) in [(7, 5), (1, 9), (64, 3), (16, 16), (1, 1)] {
+            let texels =
+                (0..width * height).map(|i| [(i * 7 % 11) as f32, 1.0, i as f32]).collect::<Vec<_>>();
+            let mean = |t: &[[f32; 3]], c: usize| t.iter().map(|t| t[c] as f64).sum::<f64>() / t.len() as f64;
+            let image = ImageData { width, height, texels: Texels::F32(texels.clone()) };
+            let levels = mip::chain(&image, &SRGB8_TO_LINEAR);
+            assert_eq!(levels.len() as u32, width.max(height).ilog2());
+            for level in &levels {
+                let Texels::F32(t) = &level.texels else { panic!("floats stay floats") };
+                assert_eq!(t.len(), level.width * level.height);
+                for c in 0..3 {
+                    // f32 weights, a few roundings a level.
+                    assert!((mean(t, c) / mean(&texels, c) - 1.0).abs() < 1e-5);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn bytes_average_linearly_and_are_rounded_once() {
+        let texels = (0..64 * 64).map(|i| if (i + i / 64) % 2 == 0 { [255; 4] } else { [0; 4] }).collect();
+        let image = ImageData { width: 64, height: 64, texels: Texels::Srgb8(texels) };
+        for level in mip::chain(&image, &SRGB8_TO_LINEAR) {
+            // Linear 0.5 is code 187.5 of the curve.
+            assert!((level.texel(0, 0).r - 0.5).abs() < 0.004, "half a code is 0.0036 there");
+        }
+    }
+}
