@@ -1,5 +1,7 @@
 #include "shim.h"
 
+#include <string.h>
+
 _Static_assert(offsetof(EmQuery, context) == 0, "callbacks cast the context back to the query");
 _Static_assert(RTC_INVALID_GEOMETRY_ID == 0xffffffffu, "Rust's INVALID_ID");
 
@@ -72,6 +74,68 @@ void em_occluded_stream16(RTCScene scene, EmQuery* query, struct RTCRay16* rays,
   }
 }
 
+/* `n` <= 16 words; a constant size lets the compiler move whole packets without a call. */
+static inline void copy(void* to, const void* from, unsigned int n) {
+  if (n == 16)
+    memcpy(to, from, 16 * sizeof(float));
+  else
+    memcpy(to, from, n * sizeof(float));
+}
+
+/* Rays first .. first + n (n <= 16) into a packet; lanes without a ray, or with one that is off, are off. */
+static void load_packet(const EmRays* from, unsigned int first, unsigned int n, struct RTCRay16* to, int* valid) {
+  unsigned int k;
+  copy(to->org_x, from->org_x + first, n);
+  copy(to->org_y, from->org_y + first, n);
+  copy(to->org_z, from->org_z + first, n);
+  copy(to->tnear, from->tnear + first, n);
+  copy(to->dir_x, from->dir_x + first, n);
+  copy(to->dir_y, from->dir_y + first, n);
+  copy(to->dir_z, from->dir_z + first, n);
+  copy(to->tfar, from->tfar + first, n);
+  if (from->id) copy(to->id, from->id + first, n);
+  for (k = 0; k < 16; ++k) {
+    to->time[k] = 0.0f;
+    to->mask[k] = 0xffffffffu;
+    to->flags[k] = 0;
+  }
+  for (k = 0; k < n; ++k) valid[k] = to->tnear[k] <= to->tfar[k] ? -1 : 0;
+  for (k = n; k < 16; ++k) valid[k] = 0;
+}
+
+void em_intersect_soa(RTCScene scene, EmQuery* query, const EmRays* rays, const EmHits* hits, unsigned int count) {
+  RTC_ALIGN(64) int valid[16];
+  struct RTCRayHit16 packet;
+  unsigned int first, k;
+  for (first = 0; first < count; first += 16) {
+    const unsigned int n = count - first < 16 ? count - first : 16;
+    load_packet(rays, first, n, &packet.ray, valid);
+    for (k = 0; k < 16; ++k) packet.hit.geomID[k] = packet.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
+    em_intersect16(valid, scene, query, &packet);
+    for (k = 0; k < n; ++k)
+      if (packet.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID) break;
+    if (k == n) continue;
+    copy(rays->tfar + first, packet.ray.tfar, n);
+    copy(hits->u + first, packet.hit.u, n);
+    copy(hits->v + first, packet.hit.v, n);
+    copy(hits->primID + first, packet.hit.primID, n);
+    copy(hits->geomID + first, packet.hit.geomID, n);
+    copy(hits->instID + first, packet.hit.instID[0], n);
+  }
+}
+
+void em_occluded_soa(RTCScene scene, EmQuery* query, const EmRays* rays, unsigned int count) {
+  RTC_ALIGN(64) int valid[16];
+  struct RTCRay16 packet;
+  unsigned int first;
+  for (first = 0; first < count; first += 16) {
+    const unsigned int n = count - first < 16 ? count - first : 16;
+    load_packet(rays, first, n, &packet, valid);
+    em_occluded16(valid, scene, query, &packet);
+    copy(rays->tfar + first, packet.tfar, n);
+  }
+}
+
 #else /* Embree 3 */
 
 void em_query_init(EmQuery* query, unsigned int coherent, void* user) {
@@ -112,6 +176,40 @@ void em_intersect_stream16(RTCScene scene, EmQuery* query, struct RTCRayHit16* r
 
 void em_occluded_stream16(RTCScene scene, EmQuery* query, struct RTCRay16* rays, unsigned int count) {
   rtcOccludedNM(scene, &query->context, (struct RTCRayN*)rays, 16, count, sizeof(struct RTCRay16));
+}
+
+/* Embree reads the fields that are const here, although its own type says otherwise; fields left null are not
+ * wanted or have their default. */
+static struct RTCRayNp as_embree(const EmRays* rays) {
+  struct RTCRayNp to;
+  memset(&to, 0, sizeof to);
+  to.org_x = (float*)rays->org_x;
+  to.org_y = (float*)rays->org_y;
+  to.org_z = (float*)rays->org_z;
+  to.tnear = (float*)rays->tnear;
+  to.dir_x = (float*)rays->dir_x;
+  to.dir_y = (float*)rays->dir_y;
+  to.dir_z = (float*)rays->dir_z;
+  to.id = (unsigned int*)rays->id;
+  to.tfar = rays->tfar;
+  return to;
+}
+
+void em_intersect_soa(RTCScene scene, EmQuery* query, const EmRays* rays, const EmHits* hits, unsigned int count) {
+  struct RTCRayHitNp rayhits;
+  memset(&rayhits.hit, 0, sizeof rayhits.hit);
+  rayhits.ray = as_embree(rays);
+  rayhits.hit.u = hits->u;
+  rayhits.hit.v = hits->v;
+  rayhits.hit.primID = hits->primID;
+  rayhits.hit.geomID = hits->geomID;
+  rayhits.hit.instID[0] = hits->instID;
+  rtcIntersectNp(scene, &query->context, &rayhits, count);
+}
+
+void em_occluded_soa(RTCScene scene, EmQuery* query, const EmRays* rays, unsigned int count) {
+  const struct RTCRayNp np = as_embree(rays);
+  rtcOccludedNp(scene, &query->context, &np, count);
 }
 
 #endif

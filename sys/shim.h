@@ -54,4 +54,31 @@ void em_intersect_stream16(RTCScene scene, EmQuery* query, struct RTCRayHit16* r
 void em_occluded_stream1(RTCScene scene, EmQuery* query, struct RTCRay* rays, unsigned int count);
 void em_occluded_stream16(RTCScene scene, EmQuery* query, struct RTCRay16* rays, unsigned int count);
 
+/* Rays in plain arrays, one a field, of any length and alignment; id may be null. tfar becomes the distance of a
+ * hit, or -inf where em_occluded_soa finds something. */
+typedef struct EmRays {
+  const float* org_x;
+  const float* org_y;
+  const float* org_z;
+  const float* tnear;
+  const float* dir_x;
+  const float* dir_y;
+  const float* dir_z;
+  const unsigned int* id;
+  float* tfar;
+} EmRays;
+
+/* Where hits are written, in plain arrays; geomID and instID must hold RTC_INVALID_GEOMETRY_ID before. Normals are
+ * not wanted. */
+typedef struct EmHits {
+  float* u;
+  float* v;
+  unsigned int* primID;
+  unsigned int* geomID;
+  unsigned int* instID;
+} EmHits;
+
+void em_intersect_soa(RTCScene scene, EmQuery* query, const EmRays* rays, const EmHits* hits, unsigned int count);
+void em_occluded_soa(RTCScene scene, EmQuery* query, const EmRays* rays, unsigned int count);
+
 #endif

@@ -29,6 +29,7 @@
 //! | `em_intersect4/8/16`, `em_occluded4/8/16` | packets with a mask of -1 (on) and 0 (off) | the same |
 //! | `em_intersect_stream1`, `em_occluded_stream1` | `rtcIntersect1M` ... | a loop over single rays |
 //! | `em_intersect_stream16`, `em_occluded_stream16` | `rtcIntersectNM` ... | a loop over packets |
+//! | `em_intersect_soa`, `em_occluded_soa` | `rtcIntersectNp` ... | a loop over packets |
 //!
 //! Embree's own rules stand: queries do not check their arguments (a NaN aborts Debian's 3.13.5), and must not
 //! overlap with a commit of the same scene; packets are aligned as the `RTCRay*` types are; a shared vertex buffer
@@ -44,7 +45,7 @@ pub use bindings::*;
 /// Version of the header that this crate was built with: 3 or 4.
 pub const MAJOR: u32 = EM_MAJOR;
 
-/// Whether `em_*_stream*` are real streams (Embree 3), or loops (Embree 4).
+/// Whether `em_*_stream*` and `em_*_soa` are real streams (Embree 3), or loops (Embree 4).
 pub const HAS_STREAMS: bool = EM_MAJOR == 3;
 
 /// "None" as a geometry, primitive or instance id (`RTC_INVALID_GEOMETRY_ID`).

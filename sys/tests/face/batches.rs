@@ -128,6 +128,62 @@ fn streams_equal_single_rays() {
     assert_eq!(device.error(), RTC_ERROR_NONE);
 }
 
+/// Plain arrays of a length that is no multiple of any packet, with one ray switched off, and ids that a callback
+/// could read.
+#[test]
+fn plain_arrays_equal_single_rays() {
+    let device = Device::new();
+    let (vertices, indices) = sheet(40);
+    let data = Planes { height: -0.1 };
+    let mut calls = 0u32;
+    let user: *mut c_void = ptr::from_mut(&mut calls).cast();
+    let reference = Reference::new(&device, device.mesh(&vertices, &indices), &data, user);
+    let n = reference.rays.len() - 5;
+    let rays = &reference.rays[..n];
+    let column = |f: fn(&RTCRay) -> f32| rays.iter().map(f).collect::<Vec<f32>>();
+    let [ox, oy, oz] = [column(|r| r.org_x), column(|r| r.org_y), column(|r| r.org_z)];
+    let [dx, dy, dz] = [column(|r| r.dir_x), column(|r| r.dir_y), column(|r| r.dir_z)];
+    let mut near = column(|r| r.tnear);
+    near[7] = 1.0;
+    let ids: Vec<u32> = (0..n as u32).collect();
+    for coherent in [false, true] {
+        let mut q = EmQuery::new(coherent, user);
+        let [mut t, mut dark] = [column(|r| r.tfar), column(|r| r.tfar)];
+        (t[7], dark[7]) = (-1.0, -1.0);
+        let [mut u, mut v] = [vec![0.0; n], vec![0.0; n]];
+        let [mut prim, mut geom, mut inst] = [(); 3].map(|()| vec![INVALID_ID; n]);
+        let mut soa = EmRays {
+            org_x: ox.as_ptr(),
+            org_y: oy.as_ptr(),
+            org_z: oz.as_ptr(),
+            tnear: near.as_ptr(),
+            dir_x: dx.as_ptr(),
+            dir_y: dy.as_ptr(),
+            dir_z: dz.as_ptr(),
+            id: ids.as_ptr(),
+            tfar: t.as_mut_ptr(),
+        };
+        let hits = EmHits {
+            u: u.as_mut_ptr(),
+            v: v.as_mut_ptr(),
+            primID: prim.as_mut_ptr(),
+            geomID: geom.as_mut_ptr(),
+            instID: inst.as_mut_ptr(),
+        };
+        // SAFETY: n entries in every array, finite rays, scene committed.
+        unsafe {
+            em_intersect_soa(reference.scene.0, &mut q, &soa, &hits, n as u32);
+            soa.tfar = dark.as_mut_ptr();
+            em_occluded_soa(reference.scene.0, &mut q, &soa, n as u32);
+        }
+        assert_eq!((geom[7], t[7], dark[7]), (INVALID_ID, -1.0, -1.0), "ray 7 is off");
+        for i in (0..n).filter(|&i| i != 7) {
+            reference.same("soa", i, geom[i], prim[i], t[i], dark[i] < 0.0);
+        }
+    }
+    assert_eq!(device.error(), RTC_ERROR_NONE);
+}
+
 /// Scatters rays over the rows of a packet of width `n`; with room for hits if `hits`.
 fn pack(words: *mut u32, n: usize, rays: &[RTCRay], hits: bool) {
     for (lane, ray) in rays.iter().enumerate() {
