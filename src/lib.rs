@@ -5,6 +5,7 @@ pub mod color;
 pub mod error;
 pub mod formats;
 pub mod image;
+pub mod materials;
 pub mod math;
 pub mod render;
 pub mod sampler;

@@ -74,7 +74,8 @@ pub fn check_rows<T: ?Sized>(family: &str, table: &[Row<T>]) {
     assert!(error.to_string().contains("no_such_kind"), "{error}");
 }
 
-fn node(kind: &str, params: &Params) -> Node {
+/// What a scene file would say.
+pub fn node(kind: &str, params: &Params) -> Node {
     Node { kind: kind.to_owned(), params: params.clone(), ..Node::default() }
 }
 

@@ -1,0 +1,79 @@
+//! Lambert's surface, lit and seen from the same side, whichever it is.
+
+use crate::base::material::{BsdfEval, BsdfSample, Material, Prepared};
+use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
+use crate::base::shape::Needs;
+use crate::base::vertex::Vertex;
+use crate::color::Rgb;
+use crate::error::Result;
+use crate::materials::reflectance::Reflectance;
+use crate::sampling::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
+use glam::{Vec2, Vec3};
+use std::sync::Arc;
+
+pub(super) const ROW: Row<dyn Material> = Row {
+    kind: "diffuse",
+    doc: "scatters evenly (Lambert), from both sides",
+    params: &[ParamSpec {
+        name: "albedo",
+        kind: ParamKind::Texture,
+        default: Some("0.8"),
+        doc: "share of the light that is scattered, 0 to 1",
+    }],
+    build: |p| Ok(Arc::new(Diffuse::from_params(p)?)),
+    samples: || {
+        vec![
+            Params::new(),
+            Params::new().with("albedo", Value::Numbers(vec![1.0, 0.5, 0.0])),
+            Params::new().with("albedo", Value::Number(0.0)),
+        ]
+    },
+};
+
+struct Diffuse {
+    albedo: Reflectance,
+}
+
+impl Diffuse {
+    fn from_params(p: &Params) -> Result<Self> {
+        Ok(Diffuse { albedo: Reflectance::from_params(p, "albedo", [0.8; 3])? })
+    }
+}
+
+impl Material for Diffuse {
+    fn needs(&self) -> Needs {
+        self.albedo.needs()
+    }
+
+    fn prepare(&self, vertex: &Vertex, out: &mut Prepared) {
+        *out.view_mut::<Rgb>() = self.albedo.at(vertex);
+    }
+
+    #[inline]
+    fn eval(&self, m: &Prepared, wo: Vec3, wi: Vec3) -> BsdfEval {
+        if wo.z * wi.z <= 0.0 {
+            return BsdfEval::default();
+        }
+        let pdf = cosine_hemisphere_pdf(wi.z.abs());
+        BsdfEval { f_cos: *m.view::<Rgb>() * pdf, pdf }
+    }
+
+    #[inline]
+    fn sample(&self, m: &Prepared, wo: Vec3, u: [f32; 2], _uc: f32) -> Option<BsdfSample> {
+        let mut wi = cosine_hemisphere(Vec2::from(u));
+        let pdf = cosine_hemisphere_pdf(wi.z);
+        if wo.z < 0.0 {
+            wi.z = -wi.z;
+        }
+        // Directions in the surface itself scatter nothing.
+        (wo.z * wi.z > 0.0).then(|| BsdfSample { wi, weight: *m.view::<Rgb>(), pdf, delta: false })
+    }
+
+    fn albedo(&self, m: &Prepared, _wo: Vec3) -> Rgb {
+        *m.view::<Rgb>()
+    }
+
+    fn is_black(&self) -> bool {
+        self.albedo.is_black()
+    }
+}
