@@ -1,6 +1,7 @@
 //! skylit: triangle meshes and quadrics under skies, traced fast and accurately on the CPU.
 
 pub mod base;
+pub mod cameras;
 pub mod color;
 pub mod error;
 pub mod formats;
@@ -11,6 +12,7 @@ pub mod render;
 pub mod sampler;
 pub mod sampling;
 pub mod scene;
+pub mod shapes;
 #[cfg(test)]
 pub mod testing;
 pub mod textures;

@@ -1,6 +1,9 @@
 //! From points on the film to rays.
 
 use crate::base::ray::RayBatch;
+use crate::base::space::RenderSpace;
+use crate::error::Result;
+use std::sync::Arc;
 
 /// A batch of film samples, as columns of one length.
 #[derive(Debug, Clone, Copy)]
@@ -27,4 +30,26 @@ pub trait Camera: Send + Sync {
 
     /// The width of a pixel's ray at distance 1 (radians, near enough), for texture footprints.
     fn pixel_spread(&self) -> f32;
+}
+
+/// The picture a camera fills.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FilmSize {
+    /// Pixels across, at least 1.
+    pub width: u32,
+    /// Pixels down, at least 1.
+    pub height: u32,
+}
+
+impl FilmSize {
+    /// Width over height.
+    pub fn aspect(&self) -> f64 {
+        f64::from(self.width) / f64::from(self.height)
+    }
+}
+
+/// A camera in world space, as a scene describes it.
+pub trait CameraSource: Send + Sync {
+    /// The camera in render space for a film. Errors where it cannot be represented there.
+    fn place(&self, space: &RenderSpace, film: FilmSize) -> Result<Arc<dyn Camera>>;
 }

@@ -1,8 +1,11 @@
 //! Where light comes from. A sky is a light like any other; a path that leaves the scene has met it.
 
+use crate::base::space::RenderSpace;
 use crate::base::vertex::Vertex;
 use crate::color::Rgb;
+use crate::error::Result;
 use glam::Vec3;
+use std::sync::Arc;
 
 /// The point that asks for light.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,6 +76,12 @@ pub trait Light: Send + Sync {
     fn irradiance_closed_form(&self, _p: Vec3, _n: Vec3) -> Option<Rgb> {
         None
     }
+}
+
+/// A light in world space, as a scene describes it.
+pub trait LightSource: Send + Sync {
+    /// The light in render space. Errors where it cannot be represented there.
+    fn place(&self, space: &RenderSpace) -> Result<Arc<dyn Light>>;
 }
 
 /// A light chosen, with its probability.

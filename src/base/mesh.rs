@@ -21,6 +21,7 @@ pub struct TriangleMesh {
 impl TriangleMesh {
     /// From positions and indices; the padding is added here.
     pub fn new(mut positions: Vec<[f32; 3]>, indices: Vec<[u32; 3]>) -> Self {
+        positions.reserve_exact(1);
         positions.push([0.0; 3]);
         TriangleMesh { positions, indices, ..TriangleMesh::default() }
     }

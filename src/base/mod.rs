@@ -13,5 +13,6 @@ pub mod ray;
 pub mod registry;
 pub mod shape;
 pub mod skybox;
+pub mod space;
 pub mod texture;
 pub mod vertex;

@@ -2,7 +2,7 @@
 
 use crate::base::mesh::TriangleMesh;
 use crate::error::Result;
-use crate::math::aabb::Aabb;
+use crate::math::aabb::{Aabb, DAabb};
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 use std::sync::Arc;
 
@@ -127,6 +127,59 @@ pub trait Shape: Send + Sync {
 
     /// Bytes held.
     fn memory(&self) -> u64;
+
+    /// For people: "mesh, 871414 triangles".
+    fn describe(&self) -> String;
+}
+
+/// Primitives left out when a shape was placed: they can be hit by no ray, and no kernel ever sees them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Dropped {
+    /// With an index past the last vertex.
+    pub out_of_range: u64,
+    /// With a corner that is not a finite number, or lies beyond [`crate::base::ray::MAX_COORDINATE`].
+    pub not_finite: u64,
+    /// Without area in single precision.
+    pub degenerate: u64,
+}
+
+impl Dropped {
+    /// All together.
+    pub fn total(&self) -> u64 {
+        self.out_of_range + self.not_finite + self.degenerate
+    }
+}
+
+impl std::ops::Add for Dropped {
+    type Output = Dropped;
+
+    fn add(self, o: Dropped) -> Dropped {
+        Dropped {
+            out_of_range: self.out_of_range + o.out_of_range,
+            not_finite: self.not_finite + o.not_finite,
+            degenerate: self.degenerate + o.degenerate,
+        }
+    }
+}
+
+/// A shape in the space of its group, ready for kernels.
+#[derive(Clone)]
+pub struct Placed {
+    /// The shape; it may have no primitive at all, if all were dropped.
+    pub shape: Arc<dyn Shape>,
+    /// What was left out.
+    pub dropped: Dropped,
+}
+
+/// A shape in double precision and in its object's own space, as a file or a scene describes it.
+pub trait ShapeSource: Send + Sync {
+    /// Encloses everything that can be placed; empty if there is nothing.
+    fn bounds(&self) -> DAabb;
+
+    /// The shape after the affine map `to_group`, which includes recentring and scale: the one step from double to
+    /// single precision, and the one place where it is decided which primitives are valid. Consumes the source so
+    /// that large arrays can be moved where nobody else holds them. Errors where the map cannot be inverted.
+    fn place(self: Arc<Self>, to_group: &DAffine3) -> Result<Placed>;
 
     /// For people: "mesh, 871414 triangles".
     fn describe(&self) -> String;

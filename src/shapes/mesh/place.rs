@@ -1,0 +1,211 @@
+//! Placing a mesh: the one step from double to single precision, and the one decision on what is a triangle.
+
+use super::Normals;
+use super::shape::MeshShape;
+use super::smooth::smooth_normals;
+use crate::base::mesh::TriangleMesh;
+use crate::base::mesh_data::{MeshData, Positions};
+use crate::base::ray::MAX_COORDINATE;
+use crate::base::shape::{Dropped, Placed};
+use crate::error::{Error, Result};
+use crate::math::aabb::{Aabb, DAabb};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Items a task takes at a time: enough to hide the cost of a task, few enough to share out evenly.
+const GRAIN: usize = 1 << 14;
+
+/// The arrays of a mesh, owned.
+pub struct Parts {
+    /// See [`MeshData::positions`].
+    pub positions: Positions,
+    /// Empty where none are wanted.
+    pub normals: Vec<[f32; 3]>,
+    /// See [`MeshData::uvs`].
+    pub uvs: Vec<[f32; 2]>,
+    /// See [`MeshData::indices`].
+    pub indices: Vec<[u32; 3]>,
+    /// See [`MeshData::material_ids`].
+    pub slots: Vec<u16>,
+}
+
+impl Parts {
+    /// Moves the arrays where nobody else holds the mesh, else copies those that are needed.
+    pub fn from_shared(data: Arc<MeshData>, normals: Normals) -> Self {
+        let wanted = normals == Normals::File;
+        match Arc::try_unwrap(data) {
+            Ok(d) => Parts {
+                positions: d.positions,
+                normals: if wanted { d.normals } else { Vec::new() },
+                uvs: d.uvs,
+                indices: d.indices,
+                slots: d.material_ids,
+            },
+            Err(d) => Parts {
+                positions: d.positions.clone(),
+                normals: if wanted { d.normals.clone() } else { Vec::new() },
+                uvs: d.uvs.clone(),
+                indices: d.indices.clone(),
+                slots: d.material_ids.clone(),
+            },
+        }
+    }
+}
+
+/// Encloses the triangles whose corners are finite; vertices that no such triangle uses do not count.
+pub fn bounds(data: &MeshData) -> DAabb {
+    let count = data.positions.len();
+    let of = |triangles: &[[u32; 3]]| {
+        let mut b = DAabb::EMPTY;
+        for t in triangles.iter().filter(|t| t.iter().all(|&i| (i as usize) < count)) {
+            let c = t.map(|i| data.positions.get(i as usize));
+            if c.iter().all(|p| p.is_finite()) {
+                c.into_iter().for_each(|p| b.extend(p));
+            }
+        }
+        b
+    };
+    data.indices.par_chunks(GRAIN).map(of).reduce(|| DAabb::EMPTY, |a, b| a.union(b))
+}
+
+/// Carries a mesh into its group and drops what is no triangle there.
+pub fn place(parts: Parts, normals: Normals, to_group: &DAffine3) -> Result<Placed> {
+    let det = to_group.matrix3.determinant();
+    let from_group = to_group.matrix3.inverse();
+    if !(det.abs() > 0.0 && from_group.is_finite() && to_group.is_finite()) {
+        return Err(Error::Usage(
+            "a mesh is placed by a transform that cannot be inverted; scales must be finite and not 0".into(),
+        ));
+    }
+    let positions = to_single(parts.positions, to_group);
+    let mut indices = parts.indices;
+    if det < 0.0 {
+        // A mirror turns triangles inside out; the other order of corners keeps outward outward.
+        indices.par_iter_mut().with_min_len(GRAIN).for_each(|t| t.swap(1, 2));
+    }
+    let mut mesh = TriangleMesh::new(positions, indices);
+    let dropped = drop_invalid(&mut mesh, parts.slots);
+    mesh.normals = match normals {
+        Normals::Flat => Vec::new(),
+        Normals::Smooth => smooth_normals(&mesh),
+        Normals::File if usable(parts.normals.len(), &mesh) => {
+            carry_normals(parts.normals, &from_group.transpose())
+        }
+        Normals::File => Vec::new(),
+    };
+    mesh.uvs = if usable(parts.uvs.len(), &mesh) { parts.uvs } else { Vec::new() };
+    let bounds = single_bounds(&mesh);
+    Ok(Placed { shape: Arc::new(MeshShape::new(mesh, bounds)), dropped })
+}
+
+/// Whether an attribute has an entry for each vertex.
+fn usable(len: usize, mesh: &TriangleMesh) -> bool {
+    len > 0 && len == mesh.positions().len()
+}
+
+/// Positions after the map, rounded once. Single precision is overwritten in place.
+fn to_single(positions: Positions, m: &DAffine3) -> Vec<[f32; 3]> {
+    match positions {
+        Positions::F32(mut v) => {
+            // Nothing changes: do not touch the memory.
+            if *m != DAffine3::IDENTITY {
+                v.par_iter_mut().with_min_len(GRAIN).for_each(|p| {
+                    *p = m.transform_point3(Vec3::from_array(*p).as_dvec3()).as_vec3().to_array();
+                });
+            }
+            v
+        }
+        Positions::F64(v) => {
+            // One entry more, so that the kernels' padding finds room.
+            let mut out = Vec::with_capacity(v.len() + 1);
+            v.par_iter()
+                .with_min_len(GRAIN)
+                .map(|p| m.transform_point3(DVec3::from_array(*p)).as_vec3().to_array())
+                .collect_into_vec(&mut out);
+            out
+        }
+    }
+}
+
+/// Normals go by the inverse transpose. One that comes out without direction becomes zero, which a hit takes as
+/// "flat here".
+fn carry_normals(mut normals: Vec<[f32; 3]>, inverse_transpose: &DMat3) -> Vec<[f32; 3]> {
+    normals.par_iter_mut().with_min_len(GRAIN).for_each(|n| {
+        let v = *inverse_transpose * Vec3::from_array(*n).as_dvec3();
+        *n = v.try_normalize().unwrap_or(DVec3::ZERO).as_vec3().to_array();
+    });
+    normals
+}
+
+/// Why a triangle is none.
+#[derive(Clone, Copy, PartialEq)]
+enum Fault {
+    OutOfRange,
+    NotFinite,
+    Degenerate,
+}
+
+fn fault(t: &[u32; 3], positions: &[[f32; 3]]) -> Option<Fault> {
+    if t.iter().any(|&i| i as usize >= positions.len()) {
+        return Some(Fault::OutOfRange);
+    }
+    let [a, b, c] = t.map(|i| Vec3::from_array(positions[i as usize]));
+    // NaN fails the comparison.
+    let inside = |v: Vec3| v.abs().cmple(Vec3::splat(MAX_COORDINATE)).all();
+    if !(inside(a) && inside(b) && inside(c)) {
+        return Some(Fault::NotFinite);
+    }
+    // Products of differences of f32 are exact in f64 unless their sizes differ by more than 2^29.
+    let (a, b, c) = (a.as_dvec3(), b.as_dvec3(), c.as_dvec3());
+    (b - a).cross(c - a).eq(&DVec3::ZERO).then_some(Fault::Degenerate)
+}
+
+fn count_faults(indices: &[[u32; 3]], positions: &[[f32; 3]]) -> Dropped {
+    let mut d = Dropped::default();
+    for t in indices {
+        match fault(t, positions) {
+            None => {}
+            Some(Fault::OutOfRange) => d.out_of_range += 1,
+            Some(Fault::NotFinite) => d.not_finite += 1,
+            Some(Fault::Degenerate) => d.degenerate += 1,
+        }
+    }
+    d
+}
+
+/// Removes invalid triangles, with the map back to the source's numbers; a clean mesh is only read.
+fn drop_invalid(mesh: &mut TriangleMesh, mut slots: Vec<u16>) -> Dropped {
+    if slots.len() != mesh.indices.len() {
+        slots.clear();
+    }
+    let dropped = mesh
+        .indices
+        .par_chunks(GRAIN)
+        .map(|chunk| count_faults(chunk, mesh.positions()))
+        .reduce(Dropped::default, |a, b| a + b);
+    if dropped.total() > 0 {
+        let valid: Vec<u32> = (0..mesh.indices.len() as u32)
+            .into_par_iter()
+            .filter(|&t| fault(&mesh.indices[t as usize], mesh.positions()).is_none())
+            .collect();
+        mesh.indices = valid.par_iter().map(|&t| mesh.indices[t as usize]).collect();
+        if !slots.is_empty() {
+            slots = valid.par_iter().map(|&t| slots[t as usize]).collect();
+        }
+        mesh.source_ids = valid;
+    }
+    mesh.material_slots = slots;
+    dropped
+}
+
+fn single_bounds(mesh: &TriangleMesh) -> Aabb {
+    let of = |triangles: &[[u32; 3]]| {
+        let mut b = Aabb::EMPTY;
+        for i in triangles.iter().flatten() {
+            b.extend(Vec3::from_array(mesh.positions()[*i as usize]));
+        }
+        b
+    };
+    mesh.indices.par_chunks(GRAIN).map(of).reduce(|| Aabb::EMPTY, |a, b| a.union(b))
+}

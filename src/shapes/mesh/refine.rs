@@ -1,0 +1,112 @@
+//! Rays against one triangle, in double precision.
+
+use crate::base::shape::LocalRay;
+use crate::math::bounds::{U32, gamma};
+use glam::DVec3;
+
+/// A point of a triangle.
+#[derive(Debug, Clone, Copy)]
+pub struct TrianglePoint {
+    /// Barycentric coordinates, at least 0, with the sum 1.
+    pub b: [f64; 3],
+    /// Distance in lengths of the ray's direction.
+    pub t: f64,
+}
+
+/// Where the ray crosses the plane of the triangle, if that lies within it; closed at the edges, and without gaps
+/// between neighbours: an edge gives both its triangles the same edge function, up to the sign (Woop, Benthin,
+/// Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013, in double precision).
+pub fn intersect(ray: &LocalRay, v: [DVec3; 3]) -> Option<TrianglePoint> {
+    let d = ray.d;
+    let a = d.abs();
+    // z along the direction's largest axis.
+    let (kx, ky, kz) = if a.x > a.y && a.x > a.z {
+        (1, 2, 0)
+    } else if a.y > a.z {
+        (2, 0, 1)
+    } else {
+        (0, 1, 2)
+    };
+    let (sx, sy, sz) = (d[kx] / d[kz], d[ky] / d[kz], 1.0 / d[kz]);
+    let [p0, p1, p2] = v.map(|c| {
+        let c = c - ray.o;
+        DVec3::new(c[kx] - sx * c[kz], c[ky] - sy * c[kz], sz * c[kz])
+    });
+    let e0 = p1.x * p2.y - p1.y * p2.x;
+    let e1 = p2.x * p0.y - p2.y * p0.x;
+    let e2 = p0.x * p1.y - p0.y * p1.x;
+    if (e0 < 0.0 || e1 < 0.0 || e2 < 0.0) && (e0 > 0.0 || e1 > 0.0 || e2 > 0.0) {
+        return None;
+    }
+    let det = e0 + e1 + e2;
+    let t = (e0 * p0.z + e1 * p1.z + e2 * p2.z) / det;
+    // A zero determinant (seen edge on) leaves t NaN, which fails the comparison.
+    (t >= ray.tnear && t <= ray.tfar).then(|| TrianglePoint { b: [e0 / det, e1 / det, e2 / det], t })
+}
+
+/// The point of the triangle that the ray crosses; where a kernel's rounding has it that a ray hits which just
+/// passes by, the point nearest to the ray.
+#[inline]
+pub fn locate(ray: &LocalRay, v: &[DVec3; 3], n: DVec3, e1: DVec3, e2: DVec3) -> TrianglePoint {
+    // Cramer's rule as by Moeller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", JGT 2(1), 1997.
+    let s = ray.o - v[0];
+    let q = s.cross(ray.d);
+    let inv = -1.0 / ray.d.dot(n);
+    let (b1, b2, t) = (e2.dot(q) * inv, -e1.dot(q) * inv, s.dot(n) * inv);
+    let b0 = 1.0 - b1 - b2;
+    // One test for all that is odd, NaN among it.
+    if b0.min(b1).min(b2) >= 0.0 && inv.is_finite() {
+        return TrianglePoint { b: [b0, b1, b2], t };
+    }
+    nearest_on_edges(ray, v)
+}
+
+/// The point of the three edges that lies nearest to the line of the ray.
+#[cold]
+fn nearest_on_edges(ray: &LocalRay, v: &[DVec3; 3]) -> TrianglePoint {
+    let length = ray.d.length();
+    let d = ray.d / length;
+    let across = |w: DVec3| w - d * d.dot(w);
+    let mut best = (f64::INFINITY, TrianglePoint { b: [1.0, 0.0, 0.0], t: 0.0 });
+    for i in 0..3 {
+        let j = (i + 1) % 3;
+        let (w, e) = (across(v[i] - ray.o), across(v[j] - v[i]));
+        let s = (-w.dot(e) / e.length_squared()).clamp(0.0, 1.0);
+        // An edge along the ray: its first end.
+        let s = if s.is_nan() { 0.0 } else { s };
+        let distance = (w + e * s).length_squared();
+        if distance < best.0 {
+            let mut b = [0.0; 3];
+            (b[i], b[j]) = (1.0 - s, s);
+            let p = v[i] + (v[j] - v[i]) * s;
+            best = (distance, TrianglePoint { b, t: d.dot(p - ray.o) / length });
+        }
+    }
+    best.1
+}
+
+/// How far the point `p` of a triangle may lie from the triangle as an f32 kernel sees it when it tests a ray that
+/// starts next to `p`, per axis. `e1`, `e2` are the edges from the first corner, `n` their cross product.
+///
+/// Robust kernels (Davidovic et al., "3D Rasterization: A Bridge between Rasterization and Ray Casting", 2012; also
+/// Embree's robust mode) first subtract the origin, so they see each corner off by u |v_i - p|, and `p`, a mean of
+/// corners, by no more than the largest of these. Then they compute the height over the plane, T = v . N with N a
+/// product of two edges: each component of N is off by gamma(4) of m, the sum of the sizes of its two terms (edges
+/// rounded once each, a product, a difference), and the scalar product adds gamma(3). |N_k| <= m_k, so the height
+/// is off by gamma(7) sum |v_k| m_k / |N|. They choose for each component the pair of edges with the smaller first
+/// term; its terms are at most 2 min(m) + |N| <= 3 min(m): 21 roundings.
+#[inline]
+pub fn test_error(v: &[DVec3; 3], p: DVec3, e1: DVec3, e2: DVec3, n: DVec3) -> DVec3 {
+    let r0 = (v[0] - p).abs();
+    let r = r0.max((v[1] - p).abs()).max((v[2] - p).abs());
+    let terms = |a: DVec3, b: DVec3| {
+        let (a, b) = (a.abs(), b.abs());
+        let yzx = |v: DVec3| DVec3::new(v.y, v.z, v.x);
+        let zxy = |v: DVec3| DVec3::new(v.z, v.x, v.y);
+        yzx(a) * zxy(b) + zxy(a) * yzx(b)
+    };
+    let m = terms(e1, e2).min(terms(e1, e2 - e1));
+    let height = f64::from(gamma(21)) * r0.dot(m) / n.length();
+    // A plane through a corner cannot be further away than the corner.
+    r * (2.0 * f64::from(U32)) + DVec3::splat(height.min(r.max_element()))
+}

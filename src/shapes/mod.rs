@@ -1,0 +1,15 @@
+//! Shapes: one file a kind, each with its registry row.
+
+pub mod ellipsoid;
+pub mod mesh;
+pub mod quadric;
+pub mod sphere;
+
+use crate::base::registry::Row;
+use crate::base::shape::ShapeSource;
+
+/// Every kind of shape.
+pub static REGISTRY: &[Row<dyn ShapeSource>] = &[mesh::ROW, sphere::ROW, ellipsoid::ROW];
+
+#[cfg(test)]
+mod tests;
