@@ -1,1 +1,48 @@
 //! L4: files to plain scene data, one file a format.
+
+pub mod ply;
+pub mod source;
+mod triangulate;
+
+use crate::base::mesh_data::MeshData;
+use crate::error::{Error, Result, unknown_name};
+use std::path::Path;
+
+/// One mesh format: the extension that names it, and its reader.
+struct MeshFormat {
+    extension: &'static str,
+    parse: fn(&Path, &[u8]) -> Result<MeshData>,
+}
+
+const MESH_FORMATS: &[MeshFormat] = &[MeshFormat { extension: "ply", parse: ply::parse }];
+
+/// The extensions of mesh files that [`load_mesh`] reads, without those of packing.
+pub fn mesh_extensions() -> impl Iterator<Item = &'static str> {
+    MESH_FORMATS.iter().map(|format| format.extension)
+}
+
+/// Whether [`load_mesh`] knows the kind of file that `path` names.
+pub fn is_mesh_path(path: &Path) -> bool {
+    source::content_extension(path).is_some_and(|e| mesh_extensions().any(|known| known == e))
+}
+
+/// Loads the mesh file at `path`, its kind told by the extension in any case, also packed (`.gz`, `.zst`). What was
+/// mended on the way is counted in the mesh and logged as one warning.
+///
+/// # Errors
+/// [`Error::File`] if the file cannot be read; [`Error::Content`] if the extension is unknown, the content is damaged
+/// or there is no surface in it.
+pub fn load_mesh(path: &Path) -> Result<MeshData> {
+    let extension = source::content_extension(path);
+    let known = MESH_FORMATS.iter().find(|format| Some(format.extension) == extension.as_deref());
+    let Some(format) = known else {
+        let name = extension.unwrap_or_default();
+        let what = unknown_name("kind of mesh file", &name, mesh_extensions());
+        return Err(Error::content(path, format!("{what} (each also packed as .gz or .zst)")));
+    };
+    let mesh = (format.parse)(path, &source::read(path)?)?;
+    if let Some(repairs) = mesh.repairs.describe() {
+        log::warn!("{}: {repairs}", path.display());
+    }
+    Ok(mesh)
+}

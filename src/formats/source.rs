@@ -1,0 +1,228 @@
+//! Reading an input file whole, decompressing gzip and Zstandard data on the way.
+
+use crate::error::{Error, Result};
+use std::ffi::OsStr;
+use std::io::Read;
+use std::path::Path;
+
+const GZIP_MAGIC: &[u8] = &[0x1f, 0x8b];
+const ZSTD_MAGIC: &[u8] = &[0x28, 0xb5, 0x2f, 0xfd];
+
+/// Compressed data may always grow to this many bytes, whatever its ratio.
+const FREE_EXPANSION: u64 = 256 << 20;
+/// Beyond that it may grow this many times. Text meshes reach 6, a flat generated grid about 50; bombs 1000 and more.
+const MAX_RATIO: u64 = 200;
+
+/// The bytes of the file at `path`; what gzip or Zstandard packed is unpacked, recognised by its first bytes and not
+/// by its name. Several packed streams one after another read as one.
+///
+/// # Errors
+/// [`Error::File`] if the file cannot be opened or read; [`Error::Content`] if packed data is damaged, or expands to
+/// more than 256 MiB and 200 times its size (a decompression bomb).
+pub fn read(path: &Path) -> Result<Vec<u8>> {
+    let bytes = read_raw(path)?;
+    let packed = bytes.len() as u64;
+    let limit = FREE_EXPANSION.max(packed.saturating_mul(MAX_RATIO));
+    if bytes.starts_with(GZIP_MAGIC) {
+        unpack(path, "gzip", flate2::read::MultiGzDecoder::new(&bytes[..]), limit)
+    } else if bytes.starts_with(ZSTD_MAGIC) {
+        unpack(path, "Zstandard", ZstdFrames::new(&bytes), limit)
+    } else {
+        refuse_misnamed(path, &bytes)?;
+        Ok(bytes)
+    }
+}
+
+/// The extension that tells what is in the file, in lower case, with `.gz` or `.zst` stripped: `ply` for
+/// `dragon.PLY.gz`. `None` where there is none.
+pub fn content_extension(path: &Path) -> Option<String> {
+    let lower = |p: &Path| p.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase);
+    let last = lower(path)?;
+    if is_packer(&last) { lower(Path::new(path.file_stem()?)) } else { Some(last) }
+}
+
+fn is_packer(extension: &str) -> bool {
+    matches!(extension, "gz" | "zst")
+}
+
+fn read_raw(path: &Path) -> Result<Vec<u8>> {
+    let fail = |e: std::io::Error| Error::file(path, "read", e);
+    let mut file = std::fs::File::open(path).map_err(|e| Error::file(path, "open", e))?;
+    let meta = file.metadata().map_err(fail)?;
+    if meta.is_dir() {
+        return Err(Error::file(path, "read", "it is a folder"));
+    }
+    let mut bytes = Vec::new();
+    // A size that memory cannot hold is an error here and not an abort further on.
+    bytes.try_reserve_exact(usize::try_from(meta.len()).unwrap_or(usize::MAX)).map_err(|_| {
+        Error::file(path, "read", format!("its {} MiB do not fit in memory", meta.len() >> 20))
+    })?;
+    file.read_to_end(&mut bytes).map_err(fail)?;
+    Ok(bytes)
+}
+
+fn unpack(path: &Path, packing: &str, mut stream: impl Read, limit: u64) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    stream
+        .by_ref()
+        .take(limit + 1)
+        .read_to_end(&mut bytes)
+        .map_err(|e| Error::content(path, format!("the {packing} data is damaged or cut short: {e}")))?;
+    if bytes.len() as u64 > limit {
+        return Err(Error::content(
+            path,
+            format!(
+                "the {packing} data expands to more than {} MiB, over {MAX_RATIO} times its size; \
+                 if it is to be trusted, unpack it first",
+                limit >> 20
+            ),
+        ));
+    }
+    Ok(bytes)
+}
+
+fn refuse_misnamed(path: &Path, bytes: &[u8]) -> Result<()> {
+    let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_ascii_lowercase();
+    if !bytes.is_empty() && !is_packer(&extension) {
+        return Ok(());
+    }
+    let message = if bytes.is_empty() {
+        "the file is empty".to_string()
+    } else {
+        format!("named .{extension}, but its first bytes are not those of gzip or Zstandard data")
+    };
+    Err(Error::content(path, message))
+}
+
+/// All frames of Zstandard data, one after another (`cat a.zst b.zst`, or what a parallel packer writes); frames
+/// marked to be skipped are (RFC 8878, 3.1.2).
+struct ZstdFrames<'a> {
+    rest: &'a [u8],
+    decoder: ruzstd::decoding::FrameDecoder,
+    in_frame: bool,
+}
+
+impl<'a> ZstdFrames<'a> {
+    fn new(bytes: &'a [u8]) -> Self {
+        ZstdFrames { rest: bytes, decoder: ruzstd::decoding::FrameDecoder::new(), in_frame: false }
+    }
+
+    /// Enters the next frame; `false` at the end of the data.
+    fn next_frame(&mut self) -> std::io::Result<bool> {
+        use ruzstd::decoding::errors::{FrameDecoderError, ReadFrameHeaderError};
+        while !self.rest.is_empty() {
+            match self.decoder.init(&mut self.rest) {
+                Ok(()) => return Ok(true),
+                Err(FrameDecoderError::ReadFrameHeaderError(ReadFrameHeaderError::SkipFrame {
+                    length,
+                    ..
+                })) => {
+                    self.rest = self.rest.get(length as usize..).unwrap_or_default();
+                }
+                Err(e) => return Err(std::io::Error::other(e)),
+            }
+        }
+        Ok(false)
+    }
+}
+
+impl Read for ZstdFrames<'_> {
+    fn read(&mut self, buf: &mut [u8]) -> std::io::Result<usize> {
+        use ruzstd::decoding::BlockDecodingStrategy::UptoBlocks;
+        loop {
+            if !self.in_frame {
+                if !self.next_frame()? {
+                    return Ok(0);
+                }
+                self.in_frame = true;
+            }
+            if self.decoder.can_collect() > 0 {
+                return self.decoder.read(buf);
+            }
+            if self.decoder.is_finished() {
+                self.in_frame = false;
+            } else {
+                self.decoder.decode_blocks(&mut self.rest, UptoBlocks(1)).map_err(std::io::Error::other)?;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+
+    fn gzip(data: &[u8]) -> Vec<u8> {
+        let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::best());
+        packer.write_all(data).unwrap();
+        packer.finish().unwrap()
+    }
+
+    fn zstd(data: &[u8]) -> Vec<u8> {
+        ruzstd::encoding::compress_to_vec(data, ruzstd::encoding::CompressionLevel::Fastest)
+    }
+
+    fn file(dir: &tempfile::TempDir, name: &str, bytes: &[u8]) -> std::path::PathBuf {
+        let path = dir.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        path
+    }
+
+    #[test]
+    fn packed_files_read_as_their_content() {
+        let dir = tempfile::tempdir().unwrap();
+        let text: Vec<u8> =
+            (0..20_000u32).flat_map(|i| format!("v {i} {} 0\n", i * i).into_bytes()).collect();
+        for packed in [text.clone(), gzip(&text), zstd(&text)] {
+            assert_eq!(read(&file(&dir, "any name", &packed)).unwrap(), text);
+        }
+        // Two streams in a row, with a skippable frame of five bytes between the Zstandard ones.
+        let twice = [text.clone(), text.clone()].concat();
+        assert_eq!(read(&file(&dir, "two", &[gzip(&text), gzip(&text)].concat())).unwrap(), twice);
+        let skip = [0x50, 0x2a, 0x4d, 0x18, 5, 0, 0, 0, 1, 2, 3, 4, 5].to_vec();
+        assert_eq!(read(&file(&dir, "two", &[zstd(&text), skip, zstd(&text)].concat())).unwrap(), twice);
+    }
+
+    #[test]
+    fn a_bomb_is_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let bomb = gzip(&vec![0u8; (FREE_EXPANSION + (1 << 20)) as usize]);
+        let e = read(&file(&dir, "bomb.ply.gz", &bomb)).unwrap_err();
+        assert!(e.to_string().contains("expands to more than 256 MiB"), "{e}");
+        assert_eq!(e.exit_code(), 2);
+    }
+
+    #[test]
+    fn damaged_and_misnamed_files_are_errors() {
+        let dir = tempfile::tempdir().unwrap();
+        let text = b"ply\nformat ascii 1.0\n".repeat(100);
+        for packed in [gzip(&text), zstd(&text)] {
+            for cut in [4, 6, packed.len() / 2, packed.len() - 5] {
+                assert_eq!(
+                    read(&file(&dir, "cut", &packed[..cut])).unwrap_err().exit_code(),
+                    2,
+                    "cut at {cut}"
+                );
+            }
+        }
+        let e = read(&file(&dir, "a.ply.gz", b"ply\n")).unwrap_err();
+        assert!(e.to_string().contains("not those of gzip"), "{e}");
+        assert!(read(&file(&dir, "a.ply", b"")).unwrap_err().to_string().contains("empty"));
+        assert_eq!(read(&dir.path().join("absent.ply")).unwrap_err().exit_code(), 3);
+        assert_eq!(read(dir.path()).unwrap_err().exit_code(), 3);
+    }
+
+    #[test]
+    fn the_content_extension_ignores_packing_and_case() {
+        for (name, want) in [
+            ("a.ply", Some("ply")),
+            ("a.b.OBJ.GZ", Some("obj")),
+            ("x/a.Ply.zst", Some("ply")),
+            ("a.gz", None),
+            ("a", None),
+        ] {
+            assert_eq!(content_extension(Path::new(name)).as_deref(), want, "{name}");
+        }
+    }
+}
