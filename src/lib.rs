@@ -6,6 +6,7 @@ pub mod color;
 pub mod error;
 pub mod formats;
 pub mod image;
+pub mod lights;
 pub mod materials;
 pub mod math;
 pub mod render;
@@ -13,6 +14,7 @@ pub mod sampler;
 pub mod sampling;
 pub mod scene;
 pub mod shapes;
+pub mod skyboxes;
 #[cfg(test)]
 pub mod testing;
 pub mod textures;

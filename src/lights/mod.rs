@@ -1,0 +1,1 @@
+//! L2: lights, one file a kind.
