@@ -10,3 +10,6 @@ use crate::base::registry::Row;
 
 /// Every kind of camera.
 pub static REGISTRY: &[Row<dyn CameraSource>] = &[perspective::ROW];
+
+#[cfg(test)]
+mod tests;

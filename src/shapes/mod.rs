@@ -1,15 +1,18 @@
 //! Shapes: one file a kind, each with its registry row.
 
+mod cuboid;
 pub mod ellipsoid;
 pub mod mesh;
 pub mod quadric;
+mod rectangle;
 pub mod sphere;
 
 use crate::base::registry::Row;
 use crate::base::shape::ShapeSource;
 
 /// Every kind of shape.
-pub static REGISTRY: &[Row<dyn ShapeSource>] = &[mesh::ROW, sphere::ROW, ellipsoid::ROW];
+pub static REGISTRY: &[Row<dyn ShapeSource>] =
+    &[mesh::ROW, sphere::ROW, ellipsoid::ROW, cuboid::ROW, rectangle::ROW];
 
 #[cfg(test)]
 mod tests;

@@ -1,48 +1,20 @@
 //! Every row of the registry, by its own sample parameters, through the promises of [`Shape`].
 
+mod sampling;
+
 use super::REGISTRY;
-use crate::base::registry;
 use crate::base::shape::{LocalRay, Needs, Shape, ShapeSource};
 use crate::math::aabb::{Aabb, DAabb};
+use crate::testing::TestRng;
+use crate::testing::rows::{Built, built, check_rows};
 use glam::{DAffine3, DMat3, DQuat, DVec3};
-use std::sync::Arc;
 
-/// A deterministic stream of numbers in [0, 1).
-pub(super) struct Stream(u64);
-
-impl Stream {
-    pub(super) fn new(seed: u64) -> Self {
-        Stream(seed)
-    }
-
-    pub(super) fn next(&mut self) -> f64 {
-        // Knuth's MMIX generator; the high bits are good.
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    pub(super) fn direction(&mut self) -> DVec3 {
-        let z = 2.0 * self.next() - 1.0;
-        let phi = std::f64::consts::TAU * self.next();
-        let r = (1.0 - z * z).sqrt();
-        DVec3::new(r * phi.cos(), r * phi.sin(), z)
-    }
-
-    pub(super) fn point_in(&mut self, b: &DAabb) -> DVec3 {
-        b.min + b.size() * DVec3::new(self.next(), self.next(), self.next())
-    }
+fn point_in(rng: &mut TestRng, b: &DAabb) -> DVec3 {
+    b.min + b.size() * (rng.cube() * 0.5 + DVec3::splat(0.5))
 }
 
-/// Rows by name with every sample.
-fn sources() -> Vec<(String, Arc<dyn ShapeSource>)> {
-    let mut all = Vec::new();
-    for row in REGISTRY {
-        for (i, params) in (row.samples)().into_iter().enumerate() {
-            registry::check(row.kind, row.params, &params).expect("samples keep to their declaration");
-            all.push((format!("{} {i}", row.kind), (row.build)(&params).expect("samples build")));
-        }
-    }
-    all
+fn sources() -> Vec<Built<dyn ShapeSource>> {
+    built("shape", REGISTRY)
 }
 
 /// Placements: where it is but recentred, turned and scaled, mirrored, sheared.
@@ -62,7 +34,7 @@ fn placements(bounds: &DAabb) -> Vec<(&'static str, DAffine3)> {
 }
 
 fn for_each_placed(mut check: impl FnMut(&str, &dyn Shape)) {
-    for (name, source) in sources() {
+    for Built { label: name, it: source } in sources() {
         for (how, to_group) in placements(&source.bounds()) {
             let placed = source.clone().place(&to_group).expect("samples can be placed");
             assert_eq!(placed.dropped.total(), 0, "{name}: samples are clean");
@@ -77,14 +49,14 @@ fn for_each_placed(mut check: impl FnMut(&str, &dyn Shape)) {
 }
 
 /// Rays that start anywhere around the shape and aim at some point of it, inside and outside.
-pub(super) fn ray_at(s: &mut Stream, b: &Aabb) -> LocalRay {
+pub(super) fn ray_at(s: &mut TestRng, b: &Aabb) -> LocalRay {
     let b = DAabb::from(*b);
     let radius = 0.5 * b.size().length();
-    let target = s.point_in(&b);
-    let o = b.center() + s.direction() * radius * (0.2 + 4.0 * s.next());
+    let target = point_in(s, &b);
+    let o = b.center() + s.direction().as_dvec3() * radius * (0.2 + 4.0 * s.f64());
     // f32 rays, as kernels have them, and of any length.
     let o = o.as_vec3().as_dvec3();
-    let d = ((target - o) * (0.1 + s.next())).as_vec3().as_dvec3();
+    let d = ((target - o) * (0.1 + s.f64())).as_vec3().as_dvec3();
     LocalRay { o, d, tnear: 0.0, tfar: f64::INFINITY }
 }
 
@@ -94,9 +66,19 @@ pub(super) fn closest(shape: &dyn Shape, ray: &LocalRay) -> Option<(u32, f64)> {
     hits.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
+/// Whether it has no border, so that outside and inside mean something.
+fn is_closed(name: &str) -> bool {
+    !["rectangle", "terrain"].iter().any(|k| name.contains(k))
+}
+
+#[test]
+fn rows_are_sound() {
+    check_rows("shape", REGISTRY);
+}
+
 #[test]
 fn refine_agrees_with_intersect_and_lies_inside_the_bounds() {
-    let mut s = Stream::new(1);
+    let mut s = TestRng::new(1);
     for_each_placed(|name, shape| {
         let mut hits = 0;
         for _ in 0..400 {
@@ -116,16 +98,16 @@ fn refine_agrees_with_intersect_and_lies_inside_the_bounds() {
             assert!(at.lift.is_finite() && at.lift.dot(at.ng) >= 0.0, "{name}");
             assert!(at.error.is_finite() && at.error.cmpge(DVec3::ZERO).all(), "{name}");
         }
-        assert!(hits > 100, "{name}: rays aim at it, yet only {hits} hit");
+        assert!(hits > 30, "{name}: rays aim at it, yet only {hits} hit");
     });
 }
 
 #[test]
 fn outward_is_outward_under_every_placement() {
-    // All samples are closed surfaces: the first crossing from far outside meets the outer side.
-    let mut s = Stream::new(2);
+    // The first crossing from far outside meets the outer side.
+    let mut s = TestRng::new(2);
     for_each_placed(|name, shape| {
-        for _ in 0..200 {
+        for _ in 0..if is_closed(name) { 200 } else { 0 } {
             let mut ray = ray_at(&mut s, &shape.bounds());
             ray.o -= ray.d * (100.0 * DAabb::from(shape.bounds()).size().length() / ray.d.length());
             let Some((prim, t)) = closest(shape, &ray) else { continue };
@@ -137,8 +119,8 @@ fn outward_is_outward_under_every_placement() {
 
 #[test]
 fn placing_equals_transforming_rays() {
-    let mut s = Stream::new(3);
-    for (name, source) in sources() {
+    let mut s = TestRng::new(3);
+    for Built { label: name, it: source } in sources() {
         let center = DAffine3::from_translation(-source.bounds().center());
         let base = source.clone().place(&center).expect("places").shape;
         for (how, to_group) in placements(&source.bounds()) {
@@ -178,17 +160,17 @@ fn shape_edge(shape: &dyn Shape, ray: &LocalRay, prim: u32) -> bool {
 
 #[test]
 fn areas_agree_with_cauchys_formula() {
-    // The mean number of crossings of uniform lines with a closed surface is proportional to its area: for lines
+    // The mean number of crossings of uniform lines with a surface is proportional to its area: for lines
     // through a ball of radius R, crossings per line = area / (2 pi R^2) (Cauchy-Crofton).
     for_each_placed(|name, shape| {
         let b = DAabb::from(shape.bounds());
         let radius = 0.5 * b.size().length();
-        let mut s = Stream::new(4);
+        let mut s = TestRng::new(4);
         let (mut crossings, n) = (0u32, 4000);
         for _ in 0..n {
-            let d = s.direction();
+            let d = s.direction().as_dvec3();
             let x = d.any_orthonormal_vector();
-            let (r, phi) = (radius * s.next().sqrt(), std::f64::consts::TAU * s.next());
+            let (r, phi) = (radius * s.f64().sqrt(), std::f64::consts::TAU * s.f64());
             let o = b.center() + (x * phi.cos() + d.cross(x) * phi.sin()) * r - d * 3.0 * radius;
             let mut ray = LocalRay { o, d, tnear: 0.0, tfar: f64::INFINITY };
             for prim in 0..shape.primitive_count() {
@@ -213,11 +195,11 @@ fn unit_sphere_from_far_away_is_hit_where_it_should_be() {
     let row = REGISTRY.iter().find(|r| r.kind == "sphere").expect("registered");
     let sphere =
         (row.build)(&Default::default()).expect("builds").place(&DAffine3::IDENTITY).expect("places");
-    let mut s = Stream::new(5);
+    let mut s = TestRng::new(5);
     for _ in 0..20_000 {
-        let o = (s.direction() * 1e5).as_vec3().as_dvec3();
+        let o = (s.direction().as_dvec3() * 1e5).as_vec3().as_dvec3();
         // Around the rim, where the textbook quadratic in f32 is wrong for a third of rays.
-        let side = o.cross(s.direction()).normalize() * (0.9 + 0.2 * s.next());
+        let side = o.cross(s.direction().as_dvec3()).normalize() * (0.9 + 0.2 * s.f64());
         let d = (side - o).as_vec3().normalize().as_dvec3();
         let miss = o.cross(d).length() / d.length();
         let ray = LocalRay { o, d, tnear: 0.0, tfar: f64::INFINITY };
@@ -237,7 +219,7 @@ fn unit_sphere_from_far_away_is_hit_where_it_should_be() {
 
 #[test]
 fn transforms_that_flatten_are_errors() {
-    for (name, source) in sources() {
+    for Built { label: name, it: source } in sources() {
         for bad in [DVec3::new(1.0, 0.0, 1.0), DVec3::new(f64::NAN, 1.0, 1.0), DVec3::splat(f64::INFINITY)] {
             assert!(source.clone().place(&DAffine3::from_scale(bad)).is_err(), "{name} {bad}");
         }

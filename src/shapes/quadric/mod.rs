@@ -208,8 +208,8 @@ impl Shape for Quadric {
         sample::sample(self, from.as_dvec3(), u)
     }
 
-    fn pdf_primitive(&self, _prim: u32, from: Vec3, _wi: Vec3, p: Vec3, _ng: Vec3) -> f32 {
-        sample::pdf(self, from.as_dvec3(), p.as_dvec3())
+    fn pdf_primitive(&self, _prim: u32, from: Vec3, wi: Vec3, p: Vec3, ng: Vec3) -> f32 {
+        sample::pdf(self, from.as_dvec3(), wi.as_dvec3(), p.as_dvec3(), ng.as_dvec3())
     }
 
     fn transformed(&self, by: &DAffine3) -> Result<Arc<dyn Shape>> {

@@ -24,7 +24,8 @@ pub fn sample(q: &Quadric, from: DVec3, u: [f32; 2]) -> Option<ShapeSample> {
             let m = cap(o);
             let axis = o.try_normalize().unwrap_or(DVec3::Z);
             let w = around(axis, m, u);
-            (w, area_pdf(q, w, m, from))
+            let (wi, dist) = (q.to_group.transform_point3(w) - from).normalize_and_length();
+            (w, area_pdf(q, m, dist * dist, wi, q.normal(w).normalize()))
         }
     };
     let p = q.to_group.transform_point3(w);
@@ -40,14 +41,12 @@ pub fn sample(q: &Quadric, from: DVec3, u: [f32; 2]) -> Option<ShapeSample> {
     })
 }
 
-/// The density per solid angle with which [`sample`] takes the direction from `from` to `p` on the quadric.
-pub fn pdf(q: &Quadric, from: DVec3, p: DVec3) -> f32 {
+/// The density per solid angle with which [`sample`] takes the direction `wi` from `from` to `p` on the quadric,
+/// where the unit normal is `ng`.
+pub fn pdf(q: &Quadric, from: DVec3, wi: DVec3, p: DVec3, ng: DVec3) -> f32 {
     let pdf = match q.ball.and_then(|b| Cone::of(&b, from)) {
         Some(cone) => cone.pdf(),
-        None => {
-            let Some(w) = q.to_unit(p).try_normalize() else { return 0.0 };
-            area_pdf(q, w, cap(q.to_unit(from)), from)
-        }
+        None => area_pdf(q, cap(q.to_unit(from)), (p - from).length_squared(), wi, ng),
     };
     if pdf.is_finite() { pdf as f32 } else { 0.0 }
 }
@@ -109,10 +108,11 @@ fn cap(o: DVec3) -> f64 {
     if r > 1.0 { (r - 1.0) / r } else { 2.0 }
 }
 
-/// The density per solid angle at `from` of the image of `w`, uniform in the cap `m`: dist^2 / (cos |N| C).
-fn area_pdf(q: &Quadric, w: DVec3, m: f64, from: DVec3) -> f64 {
-    let det = q.to_group.matrix3.determinant();
-    let n = q.normal(w) * det;
-    let d = q.to_group.transform_point3(w) - from;
-    d.length_squared() * d.length() / (n.dot(d).abs() * TAU * m)
+/// The density per solid angle of a point with this squared distance, direction and unit normal, uniform in the cap
+/// `m` before the map: dist^2 / (cos |N| C). |N| = |det M| / |M^T n|, so that the point itself, which on a flat
+/// quadric says little about w once it is rounded, does not enter.
+fn area_pdf(q: &Quadric, m: f64, dist2: f64, wi: DVec3, ng: DVec3) -> f64 {
+    let linear = &q.to_group.matrix3;
+    let ratio = linear.determinant().abs() / (linear.transpose() * ng).length();
+    dist2 / (wi.dot(ng).abs() * ratio * TAU * m)
 }

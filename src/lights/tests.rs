@@ -1,0 +1,247 @@
+use super::REGISTRY;
+use super::area::AreaLight;
+use super::sampler::{FixedLightSampler, NAMES};
+use crate::base::hit::Hit;
+use crate::base::light::{Extent, Light, LightSampler, LightSource, PathEnd, Receiver};
+use crate::base::material::{BsdfEval, BsdfSample, Emitter, Material, Prepared};
+use crate::base::ray::Ray;
+use crate::base::registry::{Node, Params, Value};
+use crate::base::shape::{Needs, Shape};
+use crate::base::space::RenderSpace;
+use crate::base::vertex::{Origin, Vertex, local_ray};
+use crate::color::Rgb;
+use crate::testing::TestRng;
+use crate::testing::rows::{Built, built, check_rows};
+use glam::{DVec3, Vec2, Vec3};
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+const EXTENT: Extent = Extent { center: Vec3::ZERO, radius: 2.0 };
+
+/// A lamp, without reaching into another family.
+struct Lamp {
+    radiance: f32,
+    two_sided: bool,
+}
+
+impl Material for Lamp {
+    fn prepare(&self, _: &Vertex, _: &mut Prepared) {}
+
+    fn eval(&self, _: &Prepared, _: Vec3, _: Vec3) -> BsdfEval {
+        BsdfEval::default()
+    }
+
+    fn sample(&self, _: &Prepared, _: Vec3, _: [f32; 2], _: f32) -> Option<BsdfSample> {
+        None
+    }
+
+    fn albedo(&self, _: &Prepared, _: Vec3) -> Rgb {
+        Rgb::BLACK
+    }
+
+    fn emission(&self, _: Vec2, cos_o: f32) -> Rgb {
+        if cos_o > 0.0 || self.two_sided { Rgb::splat(self.radiance) } else { Rgb::BLACK }
+    }
+
+    fn emitter(&self) -> Option<Emitter> {
+        (self.radiance > 0.0)
+            .then_some(Emitter { mean: Rgb::splat(self.radiance), two_sided: self.two_sided })
+    }
+}
+
+/// A vertex where a ray meets a primitive; the tests know that it does.
+fn vertex(shape: &dyn Shape, ray: &Ray, prim: u32, t: f32) -> Vertex {
+    let surface = shape.refine(&local_ray(ray, None), prim, t, Needs::ALL);
+    let hit = Hit { t, prim, path: 0 };
+    let slot = shape.material_slot(prim) as u32;
+    Vertex::new(ray, &surface, None, Origin { hit, object: 0, slot, spread: 0.0 })
+}
+
+fn receiver(p: DVec3, n: DVec3) -> Receiver {
+    Receiver { p: p.as_vec3(), ng: n.as_vec3(), ns: n.as_vec3() }
+}
+
+#[test]
+fn rows_are_sound() {
+    check_rows("light", REGISTRY);
+}
+
+#[test]
+fn delta_lights_have_their_closed_form_in_any_space() {
+    let space = RenderSpace { center: DVec3::new(10.0, -3.0, 5.0), scale: 0.02 };
+    let mut rng = TestRng::new(1);
+    for Built { label, it } in built::<dyn LightSource>("light", REGISTRY) {
+        let world = it.place(&RenderSpace::IDENTITY).expect("places");
+        let render = it.place(&space).expect("places");
+        for _ in 0..100 {
+            let (p, n) = (rng.cube() * 3.0 + DVec3::splat(0.1), rng.direction().as_dvec3());
+            let sampled = |light: &dyn Light, p: DVec3| {
+                let s = light.sample_li(&receiver(p, DVec3::ZERO), [0.5; 2])?;
+                assert!(s.delta && s.pdf == 1.0);
+                Some(s.li.luminance() * n.as_vec3().dot(s.wi).max(0.0))
+            };
+            let closed = world.irradiance_closed_form(p.as_vec3(), n.as_vec3()).expect("known").luminance();
+            let a = sampled(&*world, p).unwrap_or(0.0);
+            // A few f32 roundings, more where the surface is seen edge on.
+            assert!((a - closed).abs() <= 1e-4 * closed + 1e-6, "{label}: {a} {closed}");
+            // Irradiance does not know of units.
+            let b = sampled(&*render, space.point(p)).unwrap_or(0.0);
+            // Coordinates of size 0.3 in f32 for distances from 0.002 on.
+            assert!((a - b).abs() <= 1e-3 * a + 1e-5, "{label}: {a} {b}");
+        }
+        assert!(world.power(&EXTENT) > 0.0);
+        let end = PathEnd { wi: Vec3::X, vertex: None };
+        assert!(world.le(&end).is_black() && world.pdf_li(&receiver(DVec3::ZERO, DVec3::X), &end) == 0.0);
+    }
+}
+
+fn area_light(node: Node, radiance: f32, two_sided: bool) -> (AreaLight, Arc<dyn Shape>) {
+    let source = crate::base::registry::build("shape", crate::shapes::REGISTRY, &node).expect("builds");
+    let shape = source.place(&glam::DAffine3::IDENTITY).expect("places").shape;
+    let lamp: Arc<dyn Material> = Arc::new(Lamp { radiance, two_sided });
+    (AreaLight::new(shape.clone(), vec![lamp]).expect("emits"), shape)
+}
+
+fn node(kind: &str, params: Params) -> Node {
+    Node { kind: kind.into(), params, ..Node::default() }
+}
+
+fn numbers(v: [f64; 3]) -> Value {
+    Value::Numbers(v.to_vec())
+}
+
+/// Irradiance at the origin, facing `n`, by samples; and its standard error.
+fn irradiance(light: &AreaLight, n: DVec3, samples: u32) -> (f64, f64) {
+    let at = receiver(DVec3::ZERO, n);
+    let mut rng = TestRng::new(7);
+    let (mut sum, mut sum2) = (0.0, 0.0);
+    for _ in 0..samples {
+        let e = light
+            .sample_li(&at, rng.vec2().to_array())
+            .map_or(0.0, |s| f64::from(s.li.r) * n.dot(s.wi.as_dvec3()).max(0.0) / f64::from(s.pdf));
+        sum += e;
+        sum2 += e * e;
+    }
+    let k = f64::from(samples);
+    let mean = sum / k;
+    (mean, ((sum2 / k - mean * mean).max(0.0) / k).sqrt())
+}
+
+#[test]
+fn a_sphere_light_gives_its_closed_form() {
+    // Irradiance from a uniform sphere wholly above the horizon: pi L (r / d)^2 cos.
+    for (center, radius) in [([0.0, 3.0, 0.0], 1.0), ([1.0, 1.0, -0.5], 0.3), ([50.0, 80.0, 3.0], 0.01)] {
+        let params = Params::new().with("center", numbers(center)).with("radius", Value::Number(radius));
+        let (light, _) = area_light(node("sphere", params), 2.0, false);
+        let c = DVec3::from_array(center);
+        let expected = 2.0 * PI * radius * radius / c.length_squared() * c.normalize().y;
+        let (e, sigma) = irradiance(&light, DVec3::Y, 20_000);
+        // Five standard errors, and the f32 of li and pdf.
+        assert!((e - expected).abs() < 5.0 * sigma + 1e-5 * expected, "{center:?}: {e} {expected} {sigma}");
+    }
+}
+
+/// Lambert's formula: irradiance at the origin of a uniform polygon of radiance 1 above the horizon.
+fn lambert(corners: &[DVec3], n: DVec3) -> f64 {
+    let edges = (0..corners.len()).map(|i| {
+        let (a, b) = (corners[i].normalize(), corners[(i + 1) % corners.len()].normalize());
+        let cross = a.cross(b);
+        0.5 * cross.length().atan2(a.dot(b)) * cross.normalize().dot(n)
+    });
+    edges.sum::<f64>().abs()
+}
+
+#[test]
+fn a_rectangle_light_gives_lamberts_formula() {
+    // Near and wide; far and small (sampled by area); seen aslant.
+    for (c, u, v) in [
+        ([0.2, 0.4, 0.1], [2.0, 0.0, 0.0], [0.0, 0.0, 1.5]),
+        ([30.0, 400.0, 10.0], [0.2, 0.0, 0.1], [0.0, 0.1, 0.3]),
+        ([1.0, 1.2, 0.0], [0.4, 0.5, 0.0], [0.0, 0.3, 1.0]),
+    ] {
+        let params =
+            Params::new().with("center", numbers(c)).with("edge_u", numbers(u)).with("edge_v", numbers(v));
+        let (light, _) = area_light(node("rectangle", params), 3.0, true);
+        let [c, u, v] = [c, u, v].map(|x| DVec3::from_array(x) * 0.5);
+        let corners = [-u - v, u - v, u + v, v - u].map(|x| c * 2.0 + x);
+        let expected = 3.0 * lambert(&corners, DVec3::Y);
+        let (e, sigma) = irradiance(&light, DVec3::Y, 20_000);
+        assert!((e - expected).abs() < 5.0 * sigma + 1e-5 * expected, "{c}: {e} {expected} {sigma}");
+        let power = 2.0 * PI * 3.0 * 4.0 * u.cross(v).length();
+        // Corners at |c| rounded to f32, for sides of about |u|.
+        let tolerance = 1e-6 * (1.0 + c.length() / u.length());
+        assert!((f64::from(light.power(&EXTENT)) / power - 1.0).abs() < tolerance);
+    }
+}
+
+#[test]
+fn one_sided_lamps_are_dark_from_behind() {
+    let up = node("rectangle", Params::new().with("center", numbers([0.0, 2.0, 0.0])));
+    let (light, _) = area_light(up.clone(), 1.0, false);
+    assert_eq!(irradiance(&light, DVec3::Y, 100).0, 0.0);
+    let (light, _) = area_light(up, 1.0, true);
+    assert!(irradiance(&light, DVec3::Y, 100).0 > 0.0);
+}
+
+#[test]
+fn a_hit_knows_the_density_it_could_have_been_sampled_with() {
+    let mut rng = TestRng::new(3);
+    for row in crate::shapes::REGISTRY {
+        for params in (row.samples)() {
+            let (light, shape) = area_light(node(row.kind, params), 1.5, true);
+            let b = shape.bounds();
+            for _ in 0..100 {
+                let p = b.center().as_dvec3() + rng.direction().as_dvec3() * f64::from(b.size().length());
+                let at = receiver(p, DVec3::ZERO);
+                let Some(s) = light.sample_li(&at, rng.vec2().to_array()) else { continue };
+                let ray = Ray::new(at.p, s.wi, 0);
+                let local = local_ray(&ray, None);
+                // All crossings near the sampled distance; one of them is the sampled primitive.
+                let near = (0..shape.primitive_count()).filter_map(|prim| {
+                    let t = shape.intersect(&local, prim)? as f32;
+                    let v = vertex(&*shape, &ray, prim, t);
+                    ((t - s.dist).abs() < 1e-4 * s.dist).then_some(v)
+                });
+                let end_pdf = near.map(|v| {
+                    let end = PathEnd { wi: s.wi, vertex: Some(&v) };
+                    assert_eq!(light.le(&end), Rgb::splat(1.5));
+                    let cos = v.wo.dot(v.ng).abs();
+                    (light.pdf_li(&at, &end) / s.pdf - 1.0).abs() * cos.max(1e-3)
+                });
+                // The direction was rounded to f32, which moves the point by 1e-7 of its distance; the rim of the
+                // thin ellipsoid bends within 1e-3 of that, so its normal turns by some 1e-4. No crossing at all:
+                // a sample on a rim, which rounding made a miss.
+                let best = end_pdf.fold(f32::INFINITY, f32::min);
+                assert!(best < 5e-4 || best == f32::INFINITY, "{}: {best}", row.kind);
+            }
+        }
+    }
+}
+
+#[test]
+fn light_samplers_choose_every_light_by_its_pmf() {
+    let lights: Vec<Arc<dyn Light>> = built::<dyn LightSource>("light", REGISTRY)
+        .into_iter()
+        .map(|b| b.it.place(&RenderSpace::IDENTITY).expect("places"))
+        .collect();
+    let at = receiver(DVec3::ZERO, DVec3::Y);
+    for name in NAMES {
+        let sampler = FixedLightSampler::by_name(name, &lights, &EXTENT).expect("known");
+        let pmfs: Vec<f32> = (0..lights.len() as u32).map(|l| sampler.pmf(&at, l)).collect();
+        assert!((pmfs.iter().sum::<f32>() - 1.0).abs() < 1e-6 && pmfs.iter().all(|p| *p > 0.02), "{pmfs:?}");
+        let (mut counts, n) = (vec![0u32; lights.len()], 100_000);
+        for i in 0..n {
+            let c = sampler.sample(&at, (i as f32 + 0.5) / n as f32).expect("there are lights");
+            assert_eq!(c.pmf, pmfs[c.light as usize]);
+            counts[c.light as usize] += 1;
+        }
+        // Evenly spaced numbers: off by at most one at each end of an interval.
+        for (c, p) in counts.iter().zip(&pmfs) {
+            assert!((f64::from(*c) - f64::from(*p) * f64::from(n)).abs() < 2.5, "{counts:?} {pmfs:?}");
+        }
+    }
+    let none = FixedLightSampler::power(&[], &EXTENT);
+    assert!(none.sample(&at, 0.5).is_none() && none.pmf(&at, 0) == 0.0);
+    let error = FixedLightSampler::by_name("pwoer", &lights, &EXTENT).err().expect("unknown").to_string();
+    assert!(error.contains("power"), "{error}");
+}
