@@ -37,9 +37,36 @@ pub fn uniform_from_key(key: u32, about: u32) -> f32 {
     super::to_unit_f32(mix32(key ^ mix32(about.wrapping_add(0x6a09_e667))))
 }
 
+/// Two numbers in [0, 1) of 24 bits, each with 28 more below, which are random and follow from both: what is left of an
+/// f32 after choosing among many cells of a table is then still uniform. The same pair always gives the same numbers.
+#[inline(always)]
+pub fn extend_unit(u: [f32; 2]) -> [f64; 2] {
+    let low = mix64((u64::from(u[0].to_bits()) << 32) | u64::from(u[1].to_bits()));
+    let lows = [low as u32 >> 4, (low >> 32) as u32 >> 4];
+    std::array::from_fn(|i| f64::from(u[i]) + f64::from(lows[i]) / (1u64 << 52) as f64)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn extended_numbers_round_down_to_the_given_and_fill_the_gap() {
+        let mut sum = [0.0; 2];
+        let n = 4096;
+        for i in 0..n {
+            let u = [i as f32 / n as f32, (n - 1 - i) as f32 / n as f32];
+            let v = extend_unit(u);
+            for k in 0..2 {
+                let rest = (v[k] - f64::from(u[k])) * f64::from(1 << 24);
+                assert!((0.0..1.0).contains(&rest));
+                sum[k] += rest / f64::from(n);
+            }
+        }
+        // sigma = 1 / sqrt(12 * 4096) = 0.0045; five of those.
+        assert!(sum.iter().all(|s| (s - 0.5).abs() < 0.0225), "{sum:?}");
+        assert!(extend_unit([super::super::ONE_MINUS_EPSILON; 2])[0] < 1.0);
+    }
 
     #[test]
     fn each_input_bit_flips_each_output_bit_half_the_time() {

@@ -38,7 +38,7 @@ impl Sampler {
 
     /// The points of one pixel; see [`PixelSampler::new`].
     pub fn pixel(self, seed: u64, x: u32, y: u32, replicate: u32) -> PixelSampler {
-        PixelSampler { kind: self, ..PixelSampler::new(seed, x, y, replicate) }
+        PixelSampler::new(seed, x, y, replicate).of_kind(self)
     }
 }
 
@@ -64,10 +64,10 @@ fn to_unit_f32(bits: u32) -> f32 {
 
 /// All the points of one pixel (of one replicate): `get_*(index, dim)` is the point of sample `index` in dimension
 /// `dim`. Dimensions are independent of each other; over the indices of one dimension (of a pair, in `get_2d`) the
-/// points are stratified, best so over the first 2^k of them. Eight bytes and a tag: keep it in the path state.
+/// points are stratified, best so over the first 2^k of them. Eight bytes: keep it in the path state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PixelSampler {
-    kind: Sampler,
+    /// Hash of seed, pixel and replicate; the last bit of the second half tells the kind (1: independent).
     key: [u32; 2],
 }
 
@@ -77,13 +77,24 @@ impl PixelSampler {
     pub fn new(seed: u64, x: u32, y: u32, replicate: u32) -> Self {
         let pixel = (u64::from(y) << 32) | u64::from(x);
         let h = hash::mix64(hash::mix64(hash::mix64(seed) ^ pixel).wrapping_add(u64::from(replicate)));
-        PixelSampler { kind: Sampler::OwenSobol, key: [h as u32, (h >> 32) as u32] }
+        PixelSampler { key: [h as u32, (h >> 32) as u32] }.of_kind(Sampler::OwenSobol)
+    }
+
+    fn of_kind(self, kind: Sampler) -> Self {
+        let bit = u32::from(kind == Sampler::Independent);
+        PixelSampler { key: [self.key[0], (self.key[1] & !1) | bit] }
+    }
+
+    /// The kind of points it gives.
+    #[inline(always)]
+    pub fn kind(&self) -> Sampler {
+        if self.key[1] & 1 == 0 { Sampler::OwenSobol } else { Sampler::Independent }
     }
 
     /// Two numbers in [0, 1) as 32-bit fractions.
     #[inline(always)]
     pub fn bits_2d(&self, index: u32, dim: Dim) -> [u32; 2] {
-        match self.kind {
+        match self.kind() {
             Sampler::OwenSobol => owen_sobol::Pair::new(self.key, dim).point(index),
             Sampler::Independent => independent::point(self.key, dim, index),
         }
@@ -111,7 +122,7 @@ impl PixelSampler {
     /// A number in [0, 1) with 24 bits: the first coordinate of `get_2d`, at half its cost.
     #[inline(always)]
     pub fn get_1d(&self, index: u32, dim: Dim) -> f32 {
-        to_unit_f32(match self.kind {
+        to_unit_f32(match self.kind() {
             Sampler::OwenSobol => owen_sobol::Pair::new(self.key, dim).first(index),
             Sampler::Independent => independent::point(self.key, dim, index)[0],
         })
@@ -124,7 +135,7 @@ impl PixelSampler {
 }
 
 /// `get_2d` for many paths at once: entry `i` is the point of sample `indices[i]` of `pixels[i]`. All slices should
-/// have the same length; the shortest decides. All `pixels` must be of the kind of the first.
+/// have the same length; the shortest decides. All are taken to be of the kind of the first.
 pub fn points_2d(pixels: &[PixelSampler], indices: &[u32], dim: Dim, out_x: &mut [f32], out_y: &mut [f32]) {
     dispatch(FillPaths { pixels, indices, dim, out: [out_x, out_y] });
 }
@@ -141,11 +152,11 @@ impl Kernel for FillPixel<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let PixelSampler { kind, key } = *self.sampler;
+        let PixelSampler { key } = *self.sampler;
         let [out_x, out_y] = self.out;
         let slots = out_x.iter_mut().zip(out_y.iter_mut()).zip(0u32..);
         let (dim, first) = (self.dim, self.first_index);
-        match kind {
+        match self.sampler.kind() {
             Sampler::OwenSobol => {
                 let pair = owen_sobol::Pair::new(key, dim);
                 for ((x, y), i) in slots {
@@ -176,7 +187,7 @@ impl Kernel for FillPaths<'_> {
         let Some(first) = self.pixels.first() else { return };
         let [out_x, out_y] = self.out;
         let slots = out_x.iter_mut().zip(out_y.iter_mut()).zip(self.pixels).zip(self.indices);
-        match first.kind {
+        match first.kind() {
             Sampler::OwenSobol => {
                 for (((x, y), pixel), &index) in slots {
                     [*x, *y] = owen_sobol::Pair::new(pixel.key, self.dim).point(index).map(to_unit_f32);
