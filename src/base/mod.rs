@@ -9,6 +9,7 @@ pub mod light;
 pub mod material;
 pub mod mesh;
 pub mod mesh_data;
+pub mod pixel_rect;
 pub mod ray;
 pub mod registry;
 pub mod shape;

@@ -1,1 +1,4 @@
 //! L4: how a scene becomes a film.
+
+pub mod film;
+pub mod fixed;
