@@ -9,7 +9,7 @@ use exr::block::chunk::Chunk;
 use exr::block::reader::{ChunksReader, Reader};
 use exr::block::{BlockIndex, UncompressedBlock};
 use exr::meta::MetaData;
-use exr::meta::attribute::{AttributeValue, ChannelDescription, SampleType};
+use exr::meta::attribute::{AttributeValue, ChannelDescription, SampleType, Text};
 use exr::meta::header::Header;
 use half::f16;
 use half::slice::HalfFloatSliceExt;
@@ -68,10 +68,16 @@ impl Picture {
             let shown = if axis == 0 { display.size.x() } else { display.size.y() };
             self.frame[axis] = shown.max(self.origin[axis] + size[axis]);
         }
-        let texts = header.own_attributes.other.iter().chain(&header.shared_attributes.other);
-        for (key, value) in texts {
+        let mut keep = |key: &str, text: &Text| {
+            // Written as UTF-8 by this program and most others; the library would take the bytes for Latin 1.
+            self.metadata.push((key.to_owned(), String::from_utf8_lossy(text.as_slice()).into_owned()));
+        };
+        let own = &header.own_attributes;
+        let known = [("software", &own.software_name), ("comments", &own.comments), ("owner", &own.owner)];
+        known.iter().for_each(|(key, text)| text.iter().for_each(|text| keep(key, text)));
+        for (key, value) in own.other.iter().chain(&header.shared_attributes.other) {
             if let AttributeValue::Text(text) = value {
-                self.metadata.push((key.to_string(), text.to_string()));
+                keep(&key.to_string(), text);
             }
         }
         self.metadata.sort();

@@ -1,6 +1,11 @@
 //! L4: pictures in and out.
 
+mod deflate;
 mod exr_read;
+mod exr_write;
 mod hdr;
 pub mod picture;
 pub mod read;
+mod srgb8;
+pub mod tonemap;
+pub mod write;
