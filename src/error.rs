@@ -85,20 +85,55 @@ impl Error {
     }
 }
 
+/// Most known names that a message lists.
+const MAX_LISTED: usize = 32;
+
 /// `unknown material "glas"; did you mean "glass"? known: diffuse, glass`
 pub fn unknown_name<'a>(what: &str, name: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let known: Vec<&str> = known.into_iter().collect();
-    let near = known
-        .iter()
-        .map(|k| (strsim::damerau_levenshtein(k, name), *k))
-        .min()
-        .filter(|(d, k)| *d <= 1 + k.len().max(name.len()) / 3);
-    let mut text = format!("unknown {what} \"{name}\"");
-    if let Some((_, k)) = near {
-        text += &format!("; did you mean \"{k}\"?");
+    let shown: String = name.chars().take(60).collect();
+    let mut text = format!("unknown {what} \"{shown}\"");
+    match nearest(name, known.iter().copied()) {
+        Some(k) => text += &format!("; did you mean \"{k}\"?"),
+        None if !known.is_empty() => text += ";",
+        None => {}
     }
     if !known.is_empty() {
-        text += &format!(" known: {}", known.join(", "));
+        text += &format!(" known: {}", known[..known.len().min(MAX_LISTED)].join(", "));
+    }
+    if known.len() > MAX_LISTED {
+        text += &format!(" and {} more", known.len() - MAX_LISTED);
     }
     text
+}
+
+/// The known name that `name` was most likely meant to be, if any is near: at most a third of it is wrong, and one
+/// letter more.
+pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let far = |k: &str| 1 + k.len().max(name.len()) / 3;
+    known
+        .into_iter()
+        // The lengths alone tell most apart, and keep the cost of a monstrous name small.
+        .filter(|k| k.len().abs_diff(name.len()) <= far(k))
+        .map(|k| (strsim::damerau_levenshtein(k, name), k))
+        .filter(|(d, k)| *d <= far(k))
+        .min()
+        .map(|(_, k)| k)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hints_name_the_nearest_and_list_the_rest() {
+        let known = ["diffuse", "glass", "mirror"];
+        let text = unknown_name("material", "glas", known);
+        assert_eq!(text, r#"unknown material "glas"; did you mean "glass"? known: diffuse, glass, mirror"#);
+        let text = unknown_name("material", "quartz", known);
+        assert_eq!(text, r#"unknown material "quartz"; known: diffuse, glass, mirror"#);
+        assert_eq!(unknown_name("material", "quartz", []), r#"unknown material "quartz""#);
+        let text = unknown_name("material", &"long".repeat(1 << 18), known);
+        assert!(text.len() < 200, "{text}");
+    }
 }

@@ -2,6 +2,7 @@
 
 pub mod base;
 pub mod cameras;
+pub mod cli;
 pub mod color;
 pub mod error;
 pub mod formats;

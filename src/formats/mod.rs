@@ -1,5 +1,6 @@
 //! L4: files to plain scene data, one file a format.
 
+pub mod families;
 pub mod ply;
 pub mod source;
 mod triangulate;

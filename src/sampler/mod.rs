@@ -36,6 +36,16 @@ impl Sampler {
         }
     }
 
+    /// One line for people.
+    pub fn doc(self) -> &'static str {
+        match self {
+            Sampler::OwenSobol => {
+                "Owen-scrambled Sobol' pairs: error on smooth light falls faster than 1/sqrt(n)"
+            }
+            Sampler::Independent => "independent uniform numbers, for comparison and statistics",
+        }
+    }
+
     /// The points of one pixel; see [`PixelSampler::new`].
     pub fn pixel(self, seed: u64, x: u32, y: u32, replicate: u32) -> PixelSampler {
         PixelSampler::new(seed, x, y, replicate).of_kind(self)

@@ -53,6 +53,17 @@ impl PixelFilter {
         }
     }
 
+    /// One line for people.
+    pub fn doc(self) -> &'static str {
+        match self {
+            PixelFilter::BlackmanHarris { .. } => {
+                "Blackman-Harris window, half width 1.5 pixels: sharp without ringing"
+            }
+            PixelFilter::Box => "the pixel's own square",
+            PixelFilter::Tent { .. } => "linear fall-off, half width 1 pixel",
+        }
+    }
+
     /// Half width in pixels: no sample lies farther from the centre in x or y.
     pub fn radius(self) -> f32 {
         match self {

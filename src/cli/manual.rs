@@ -1,0 +1,45 @@
+//! `skylit completions` and `skylit man`.
+
+use super::{command, print};
+use crate::error::{Error, Result, unknown_name};
+use clap::Args;
+
+/// Flags of `skylit completions`.
+#[derive(Args)]
+pub struct CompletionsArgs {
+    /// The shell
+    shell: clap_complete::Shell,
+}
+
+/// Flags of `skylit man`.
+#[derive(Args)]
+pub struct ManArgs {
+    /// The page of one verb instead of the whole command's
+    verb: Option<String>,
+}
+
+/// Prints a shell's completions.
+pub fn completions(args: &CompletionsArgs) -> Result<()> {
+    let mut text = Vec::new();
+    clap_complete::generate(args.shell, &mut command(), "skylit", &mut text);
+    print(&text)
+}
+
+/// Prints a manual page in roff.
+pub fn man(args: &ManArgs) -> Result<()> {
+    let mut whole = command();
+    whole.build();
+    let page = match &args.verb {
+        None => whole,
+        Some(name) => {
+            let known = whole.get_subcommands().map(clap::Command::get_name);
+            let message = unknown_name("verb", name, known);
+            let verb = whole.find_subcommand(name).cloned().ok_or(Error::Usage(message))?;
+            verb.display_name(format!("skylit-{name}"))
+        }
+    };
+    let mut text = Vec::new();
+    let rendered = clap_mangen::Man::new(page).render(&mut text);
+    rendered.map_err(|e| Error::Internal(format!("cannot make the manual page: {e}")))?;
+    print(&text)
+}
