@@ -40,7 +40,10 @@ impl TriangleMesh {
     /// The corners of a triangle.
     #[inline]
     pub fn corners(&self, triangle: u32) -> [glam::Vec3; 3] {
-        self.indices[triangle as usize].map(|i| glam::Vec3::from_array(self.positions[i as usize]))
+        // Written out: array::map is not always inlined, and this is read for every hit.
+        let [a, b, c] = self.indices[triangle as usize];
+        let vertex = |i: u32| glam::Vec3::from_array(self.positions[i as usize]);
+        [vertex(a), vertex(b), vertex(c)]
     }
 
     /// Bytes of all arrays.

@@ -122,7 +122,8 @@ pub trait Shape: Send + Sync {
     /// which meets the primitive at `p` with the unit normal `ng`.
     fn pdf_primitive(&self, prim: u32, from: Vec3, wi: Vec3, p: Vec3, ng: Vec3) -> f32;
 
-    /// The same geometry after `by`. Errors where the result cannot be represented.
+    /// The same geometry after `by`, every primitive under its old number, for lights that stand in placed groups.
+    /// Errors where the result cannot be represented.
     fn transformed(&self, by: &DAffine3) -> Result<Arc<dyn Shape>>;
 
     /// Bytes held.

@@ -71,32 +71,56 @@ pub fn bounds(data: &MeshData) -> DAabb {
 
 /// Carries a mesh into its group and drops what is no triangle there.
 pub fn place(parts: Parts, normals: Normals, to_group: &DAffine3) -> Result<Placed> {
-    let det = to_group.matrix3.determinant();
-    let from_group = to_group.matrix3.inverse();
-    if !(det.abs() > 0.0 && from_group.is_finite() && to_group.is_finite()) {
+    let (mut mesh, slots) = carry(parts, normals, to_group)?;
+    let dropped = drop_invalid(&mut mesh, slots);
+    if normals == Normals::Smooth {
+        mesh.normals = smooth_normals(&mesh);
+    }
+    let bounds = single_bounds(&mesh);
+    Ok(Placed { shape: Arc::new(MeshShape::new(mesh, bounds)), dropped })
+}
+
+/// A placed mesh after another map, with all of its triangles and their numbers; some may have lost their area.
+pub fn transformed(mesh: &TriangleMesh, by: &DAffine3) -> Result<MeshShape> {
+    let parts = Parts {
+        positions: Positions::F32(mesh.positions().to_vec()),
+        normals: mesh.normals.clone(),
+        uvs: mesh.uvs.clone(),
+        indices: mesh.indices.clone(),
+        slots: Vec::new(),
+    };
+    let (mut out, _) = carry(parts, Normals::File, by)?;
+    out.material_slots = mesh.material_slots.clone();
+    out.source_ids = mesh.source_ids.clone();
+    let bounds = single_bounds(&out);
+    if !bounds.is_empty() && (!bounds.is_finite() || bounds.max_abs() > MAX_COORDINATE) {
+        return Err(Error::Usage("a mesh is placed too far from the origin to be represented".into()));
+    }
+    Ok(MeshShape::new(out, bounds))
+}
+
+/// The arrays of a mesh after a map, and its slots; which triangles are valid is still open.
+fn carry(parts: Parts, normals: Normals, by: &DAffine3) -> Result<(TriangleMesh, Vec<u16>)> {
+    let det = by.matrix3.determinant();
+    let inverse = by.matrix3.inverse();
+    if !(det.abs() > 0.0 && inverse.is_finite() && by.is_finite()) {
         return Err(Error::Usage(
             "a mesh is placed by a transform that cannot be inverted; scales must be finite and not 0".into(),
         ));
     }
-    let positions = to_single(parts.positions, to_group);
     let mut indices = parts.indices;
     if det < 0.0 {
         // A mirror turns triangles inside out; the other order of corners keeps outward outward.
         indices.par_iter_mut().with_min_len(GRAIN).for_each(|t| t.swap(1, 2));
     }
-    let mut mesh = TriangleMesh::new(positions, indices);
-    let dropped = drop_invalid(&mut mesh, parts.slots);
-    mesh.normals = match normals {
-        Normals::Flat => Vec::new(),
-        Normals::Smooth => smooth_normals(&mesh),
-        Normals::File if usable(parts.normals.len(), &mesh) => {
-            carry_normals(parts.normals, &from_group.transpose())
-        }
-        Normals::File => Vec::new(),
-    };
-    mesh.uvs = if usable(parts.uvs.len(), &mesh) { parts.uvs } else { Vec::new() };
-    let bounds = single_bounds(&mesh);
-    Ok(Placed { shape: Arc::new(MeshShape::new(mesh, bounds)), dropped })
+    let mut mesh = TriangleMesh::new(to_single(parts.positions, by), indices);
+    if normals == Normals::File && usable(parts.normals.len(), &mesh) {
+        mesh.normals = carry_normals(parts.normals, &inverse.transpose());
+    }
+    if usable(parts.uvs.len(), &mesh) {
+        mesh.uvs = parts.uvs;
+    }
+    Ok((mesh, parts.slots))
 }
 
 /// Whether an attribute has an entry for each vertex.

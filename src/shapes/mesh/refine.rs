@@ -2,21 +2,23 @@
 
 use crate::base::shape::LocalRay;
 use crate::math::bounds::{U32, gamma};
-use glam::DVec3;
+use glam::{DVec3, Vec3, Vec3A, Vec3Swizzles};
 
 /// A point of a triangle.
 #[derive(Debug, Clone, Copy)]
 pub struct TrianglePoint {
-    /// Barycentric coordinates, at least 0, with the sum 1.
-    pub b: [f64; 3],
+    /// Weight of the second corner, at least 0.
+    pub b1: f64,
+    /// Weight of the third corner, at least 0; the first has 1 - b1 - b2, which is not negative but for rounding.
+    pub b2: f64,
     /// Distance in lengths of the ray's direction.
     pub t: f64,
 }
 
-/// Where the ray crosses the plane of the triangle, if that lies within it; closed at the edges, and without gaps
+/// The t at which the ray crosses the plane of the triangle, if that lies within it; closed at the edges, and without gaps
 /// between neighbours: an edge gives both its triangles the same edge function, up to the sign (Woop, Benthin,
 /// Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013, in double precision).
-pub fn intersect(ray: &LocalRay, v: [DVec3; 3]) -> Option<TrianglePoint> {
+pub fn intersect(ray: &LocalRay, v: [DVec3; 3]) -> Option<f64> {
     let d = ray.d;
     let a = d.abs();
     // z along the direction's largest axis.
@@ -41,33 +43,69 @@ pub fn intersect(ray: &LocalRay, v: [DVec3; 3]) -> Option<TrianglePoint> {
     let det = e0 + e1 + e2;
     let t = (e0 * p0.z + e1 * p1.z + e2 * p2.z) / det;
     // A zero determinant (seen edge on) leaves t NaN, which fails the comparison.
-    (t >= ray.tnear && t <= ray.tfar).then(|| TrianglePoint { b: [e0 / det, e1 / det, e2 / det], t })
+    (t >= ray.tnear && t <= ray.tfar).then_some(t)
 }
 
-/// The point of the triangle that the ray crosses; where a kernel's rounding has it that a ray hits which just
-/// passes by, the point nearest to the ray.
-#[inline]
-pub fn locate(ray: &LocalRay, v: &[DVec3; 3], n: DVec3, e1: DVec3, e2: DVec3) -> TrianglePoint {
-    // Cramer's rule as by Moeller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", JGT 2(1), 1997.
-    let s = ray.o - v[0];
-    let q = s.cross(ray.d);
-    let inv = -1.0 / ray.d.dot(n);
-    let (b1, b2, t) = (e2.dot(q) * inv, -e1.dot(q) * inv, s.dot(n) * inv);
-    let b0 = 1.0 - b1 - b2;
-    // One test for all that is odd, NaN among it.
-    if b0.min(b1).min(b2) >= 0.0 && inv.is_finite() {
-        return TrianglePoint { b: [b0, b1, b2], t };
+/// A triangle in double precision.
+#[derive(Debug, Clone, Copy)]
+pub struct Triangle {
+    /// A corner.
+    pub v0: DVec3,
+    /// From there to the second corner.
+    pub e1: DVec3,
+    /// From there to the third corner.
+    pub e2: DVec3,
+    /// e1 x e2: the normal, of twice the area's length.
+    pub n: DVec3,
+}
+
+impl Triangle {
+    /// From single precision, without error but for differences of very unequal numbers.
+    #[inline(always)]
+    pub fn new([a, b, c]: [Vec3; 3]) -> Self {
+        let v0 = a.as_dvec3();
+        let (e1, e2) = (b.as_dvec3() - v0, c.as_dvec3() - v0);
+        Triangle { v0, e1, e2, n: e1.cross(e2) }
     }
-    nearest_on_edges(ray, v)
+
+    /// The point with these weights of the second and third corner.
+    #[inline(always)]
+    pub fn at(&self, b1: f64, b2: f64) -> DVec3 {
+        self.v0 + self.e1 * b1 + self.e2 * b2
+    }
+
+    /// The corners.
+    pub fn corners(&self) -> [DVec3; 3] {
+        [self.v0, self.v0 + self.e1, self.v0 + self.e2]
+    }
+
+    /// The point of the triangle that the ray crosses; where a kernel's rounding has it that a ray hits which just
+    /// passes by, the point nearest to the ray.
+    #[inline(always)]
+    pub fn locate(&self, ray: &LocalRay) -> TrianglePoint {
+        // Cramer's rule as by Moeller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", JGT 2(1), 1997.
+        let s = ray.o - self.v0;
+        let q = s.cross(ray.d);
+        let inv = -1.0 / ray.d.dot(self.n);
+        let (b1, b2, t) = (self.e2.dot(q) * inv, -self.e1.dot(q) * inv, s.dot(self.n) * inv);
+        let b0 = 1.0 - b1 - b2;
+        // One branch for all that is odd, NaN among it.
+        if (b0 >= 0.0) & (b1 >= 0.0) & (b2 >= 0.0) & (inv.abs() < f64::INFINITY) {
+            return TrianglePoint { b1, b2, t };
+        }
+        nearest_on_edges(*ray, *self)
+    }
 }
 
 /// The point of the three edges that lies nearest to the line of the ray.
 #[cold]
-fn nearest_on_edges(ray: &LocalRay, v: &[DVec3; 3]) -> TrianglePoint {
+#[inline(never)]
+fn nearest_on_edges(ray: LocalRay, triangle: Triangle) -> TrianglePoint {
+    let v = triangle.corners();
     let length = ray.d.length();
     let d = ray.d / length;
     let across = |w: DVec3| w - d * d.dot(w);
-    let mut best = (f64::INFINITY, TrianglePoint { b: [1.0, 0.0, 0.0], t: 0.0 });
+    let mut best = (f64::INFINITY, TrianglePoint { b1: 0.0, b2: 0.0, t: 0.0 });
     for i in 0..3 {
         let j = (i + 1) % 3;
         let (w, e) = (across(v[i] - ray.o), across(v[j] - v[i]));
@@ -79,14 +117,14 @@ fn nearest_on_edges(ray: &LocalRay, v: &[DVec3; 3]) -> TrianglePoint {
             let mut b = [0.0; 3];
             (b[i], b[j]) = (1.0 - s, s);
             let p = v[i] + (v[j] - v[i]) * s;
-            best = (distance, TrianglePoint { b, t: d.dot(p - ray.o) / length });
+            best = (distance, TrianglePoint { b1: b[1], b2: b[2], t: d.dot(p - ray.o) / length });
         }
     }
     best.1
 }
 
 /// How far the point `p` of a triangle may lie from the triangle as an f32 kernel sees it when it tests a ray that
-/// starts next to `p`, per axis. `e1`, `e2` are the edges from the first corner, `n` their cross product.
+/// starts next to `p`, per axis; `n` is the cross product of its edges.
 ///
 /// Robust kernels (Davidovic et al., "3D Rasterization: A Bridge between Rasterization and Ray Casting", 2012; also
 /// Embree's robust mode) first subtract the origin, so they see each corner off by u |v_i - p|, and `p`, a mean of
@@ -95,18 +133,18 @@ fn nearest_on_edges(ray: &LocalRay, v: &[DVec3; 3]) -> TrianglePoint {
 /// rounded once each, a product, a difference), and the scalar product adds gamma(3). |N_k| <= m_k, so the height
 /// is off by gamma(7) sum |v_k| m_k / |N|. They choose for each component the pair of edges with the smaller first
 /// term; its terms are at most 2 min(m) + |N| <= 3 min(m): 21 roundings.
-#[inline]
-pub fn test_error(v: &[DVec3; 3], p: DVec3, e1: DVec3, e2: DVec3, n: DVec3) -> DVec3 {
+///
+/// Worked out in f32, but for what could underflow: the bound is generous, and where the rounding of `p` matters
+/// beside the triangle's size, the rounding of a vertex' position is added anyway.
+#[inline(always)]
+pub fn test_error(v: [Vec3A; 3], p: Vec3A, n: DVec3) -> DVec3 {
     let r0 = (v[0] - p).abs();
     let r = r0.max((v[1] - p).abs()).max((v[2] - p).abs());
-    let terms = |a: DVec3, b: DVec3| {
-        let (a, b) = (a.abs(), b.abs());
-        let yzx = |v: DVec3| DVec3::new(v.y, v.z, v.x);
-        let zxy = |v: DVec3| DVec3::new(v.z, v.x, v.y);
-        yzx(a) * zxy(b) + zxy(a) * yzx(b)
-    };
-    let m = terms(e1, e2).min(terms(e1, e2 - e1));
-    let height = f64::from(gamma(21)) * r0.dot(m) / n.length();
+    let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
+    let terms = |a: Vec3A, b: Vec3A| (a.yzx() * b.zxy()).abs() + (a.zxy() * b.yzx()).abs();
+    let m = terms(e1, e2).min(terms(e1, v[2] - v[1]));
+    let height = f64::from(gamma(21)) * r0.as_dvec3().dot(m.as_dvec3()) / n.length();
     // A plane through a corner cannot be further away than the corner.
-    r * (2.0 * f64::from(U32)) + DVec3::splat(height.min(r.max_element()))
+    let height = (height as f32).min(r.max_element());
+    (r * (2.0 * U32) + Vec3A::splat(height)).as_dvec3()
 }

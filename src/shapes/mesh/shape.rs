@@ -1,14 +1,13 @@
 //! A placed triangle mesh.
 
-use super::place::{Parts, place};
-use super::refine::{TrianglePoint, intersect, locate, test_error};
-use super::{Normals, sample};
+use super::place::transformed;
+use super::refine::{Triangle, TrianglePoint, intersect, test_error};
+use super::sample;
 use crate::base::mesh::TriangleMesh;
-use crate::base::mesh_data::Positions;
 use crate::base::shape::{LocalRay, Needs, Shape, ShapeSample, Surface};
 use crate::error::Result;
 use crate::math::aabb::Aabb;
-use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3};
+use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3, Vec3A};
 use std::sync::Arc;
 
 /// Valid triangles in the space of their group.
@@ -34,13 +33,9 @@ impl MeshShape {
     }
 
     #[inline]
-    fn uv(&self, prim: u32, b: [f64; 3]) -> Vec2 {
-        if self.mesh.uvs.is_empty() {
-            // As if each triangle were half of a picture: pbrt's choice for meshes without uvs.
-            return DVec2::new(b[1] + b[2], b[2]).as_vec2();
-        }
-        let [a, b_, c] = self.corner_uvs(prim);
-        (a * b[0] + b_ * b[1] + c * b[2]).as_vec2()
+    fn uv(&self, prim: u32, b1: f64, b2: f64) -> Vec2 {
+        let [p, q, r] = if self.mesh.uvs.is_empty() { DEFAULT_UVS } else { self.corner_uvs(prim) };
+        (p + (q - p) * b1 + (r - p) * b2).as_vec2()
     }
 }
 
@@ -52,18 +47,27 @@ struct Shading {
 
 /// Interpolates the corners' normals `c`. The lift projects `p` onto the tangent planes of the corners and mixes the
 /// results by the same weights (Hanika, "Hacking the shadow terminator", Ray Tracing Gems II, ch. 4).
-#[inline]
-fn shading(c: [DVec3; 3], b: [f64; 3], v: &[DVec3; 3], p: DVec3, ng: DVec3) -> Shading {
-    let ns = c[0] * b[0] + c[1] * b[1] + c[2] * b[2];
+///
+/// In f32: a lift that is off by the rounding of `p` still points outward, and normals have no more digits.
+#[inline(always)]
+fn shading(c: [Vec3A; 3], b: [f64; 2], v: [Vec3A; 3], p: Vec3A, ng: DVec3) -> Shading {
+    let (b0, b1, b2) = ((1.0 - b[0] - b[1]) as f32, b[0] as f32, b[1] as f32);
+    let ns = c[0] * b0 + c[1] * b1 + c[2] * b2;
     // Normals that cancel each other say nothing.
     if ns.length_squared() <= 1e-12 {
         return Shading { ns: ng, lift: DVec3::ZERO };
     }
+    let ns = ns.as_dvec3();
     let side = 1f64.copysign(ns.dot(ng));
-    let above = |k: usize| c[k] * (b[k] * (c[k].dot(p - v[k]) * side).min(0.0) * -side);
-    let lift = above(0) + above(1) + above(2);
+    let side32 = side as f32;
+    // The part of p - v below the plane through v with normal c, upwards.
+    let above = |c: Vec3A, v: Vec3A, b: f32| {
+        let h = c.dot(p - v) * side32;
+        c * if h < 0.0 { -h * b * side32 } else { 0.0 }
+    };
+    let lift = above(c[0], v[0], b0) + above(c[1], v[1], b1) + above(c[2], v[2], b2);
     // A corner whose normal looks away from the face could push the point through it.
-    let lift = if lift.dot(ng) >= 0.0 { lift } else { DVec3::ZERO };
+    let lift = if lift.dot(ng.as_vec3a()) >= 0.0 { lift.as_dvec3() } else { DVec3::ZERO };
     Shading { ns: ns * side, lift }
 }
 
@@ -95,19 +99,20 @@ impl Shape for MeshShape {
     }
 
     fn intersect(&self, ray: &LocalRay, prim: u32) -> Option<f64> {
-        Some(intersect(ray, self.corners(prim))?.t)
+        intersect(ray, self.corners(prim))
     }
 
     fn refine(&self, ray: &LocalRay, prim: u32, _hint: f32, needs: Needs) -> Surface {
-        let v = self.corners(prim);
-        let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
-        let ng = e1.cross(e2);
-        let TrianglePoint { b, t } = locate(ray, &v, ng, e1, e2);
-        let p = v[0] + e1 * b[1] + e2 * b[2];
+        let corners = self.mesh.corners(prim);
+        let triangle = Triangle::new(corners);
+        let TrianglePoint { b1, b2, t } = triangle.locate(ray);
+        let (p, ng) = (triangle.at(b1, b2), triangle.n);
+        let corners = [Vec3A::from(corners[0]), Vec3A::from(corners[1]), Vec3A::from(corners[2])];
+        let p32 = p.as_vec3a();
         let mut surface = Surface {
             t,
             p,
-            error: test_error(&v, p, e1, e2, ng),
+            error: test_error(corners, p32, ng),
             ng,
             ns: ng,
             uv: Vec2::ZERO,
@@ -116,14 +121,15 @@ impl Shape for MeshShape {
             lift: DVec3::ZERO,
         };
         if !self.mesh.normals.is_empty() {
-            let corner = |i: u32| Vec3::from_array(self.mesh.normals[i as usize]).as_dvec3();
-            let s = shading(self.mesh.indices[prim as usize].map(corner), b, &v, p, ng);
+            let [i, j, k] = self.mesh.indices[prim as usize];
+            let normal = |i: u32| Vec3A::from_array(self.mesh.normals[i as usize]);
+            let s = shading([normal(i), normal(j), normal(k)], [b1, b2], corners, p32, ng);
             (surface.ns, surface.lift) = (s.ns, s.lift);
         }
         if needs.uv || needs.tangents {
-            surface.uv = self.uv(prim, b);
+            surface.uv = self.uv(prim, b1, b2);
             let uv = if self.mesh.uvs.is_empty() { DEFAULT_UVS } else { self.corner_uvs(prim) };
-            [surface.dpdu, surface.dpdv] = tangents(uv, e1, e2);
+            [surface.dpdu, surface.dpdv] = tangents(uv, triangle.e1, triangle.e2);
         }
         surface
     }
@@ -133,29 +139,20 @@ impl Shape for MeshShape {
     }
 
     fn primitive_area(&self, prim: u32) -> f64 {
-        let [a, b, c] = self.corners(prim);
-        0.5 * (b - a).cross(c - a).length()
+        0.5 * Triangle::new(self.mesh.corners(prim)).n.length()
     }
 
     fn sample_primitive(&self, prim: u32, from: Vec3, u: [f32; 2]) -> Option<ShapeSample> {
-        let s = sample::sample(&self.corners(prim), from.as_dvec3(), u)?;
-        Some(ShapeSample { uv: self.uv(prim, s.b), ..s.sample })
+        let s = sample::sample(&Triangle::new(self.mesh.corners(prim)), from.as_dvec3(), u)?;
+        Some(ShapeSample { uv: self.uv(prim, s.b[0], s.b[1]), ..s.sample })
     }
 
     fn pdf_primitive(&self, prim: u32, from: Vec3, _wi: Vec3, p: Vec3, _ng: Vec3) -> f32 {
-        sample::pdf(&self.corners(prim), from.as_dvec3(), p.as_dvec3())
+        sample::pdf(&Triangle::new(self.mesh.corners(prim)), from.as_dvec3(), p.as_dvec3())
     }
 
     fn transformed(&self, by: &DAffine3) -> Result<Arc<dyn Shape>> {
-        let m = &self.mesh;
-        let parts = Parts {
-            positions: Positions::F32(m.positions().to_vec()),
-            normals: m.normals.clone(),
-            uvs: m.uvs.clone(),
-            indices: m.indices.clone(),
-            slots: m.material_slots.clone(),
-        };
-        Ok(place(parts, Normals::File, by)?.shape)
+        Ok(Arc::new(transformed(&self.mesh, by)?))
     }
 
     fn memory(&self) -> u64 {
@@ -167,5 +164,5 @@ impl Shape for MeshShape {
     }
 }
 
-/// What [`MeshShape::uv`] gives a triangle without uvs.
+/// What a triangle without uvs has: half of a picture (pbrt's choice for meshes without).
 const DEFAULT_UVS: [DVec2; 3] = [DVec2::ZERO, DVec2::X, DVec2::ONE];
