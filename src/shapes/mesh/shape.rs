@@ -143,12 +143,12 @@ impl Shape for MeshShape {
     }
 
     fn sample_primitive(&self, prim: u32, from: Vec3, u: [f32; 2]) -> Option<ShapeSample> {
-        let s = sample::sample(&Triangle::new(self.mesh.corners(prim)), from.as_dvec3(), u)?;
+        let s = sample::sample(self.mesh.corners(prim), from, u)?;
         Some(ShapeSample { uv: self.uv(prim, s.b[0], s.b[1]), ..s.sample })
     }
 
     fn pdf_primitive(&self, prim: u32, from: Vec3, _wi: Vec3, p: Vec3, _ng: Vec3) -> f32 {
-        sample::pdf(&Triangle::new(self.mesh.corners(prim)), from.as_dvec3(), p.as_dvec3())
+        sample::pdf(self.mesh.corners(prim), from, p)
     }
 
     fn transformed(&self, by: &DAffine3) -> Result<Arc<dyn Shape>> {
