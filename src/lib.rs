@@ -1,5 +1,6 @@
 //! skylit: triangle meshes and quadrics under skies, traced fast and accurately on the CPU.
 
+pub mod accel;
 pub mod base;
 pub mod cameras;
 pub mod cli;

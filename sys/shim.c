@@ -110,7 +110,8 @@ void em_intersect_soa(RTCScene scene, EmQuery* query, const EmRays* rays, const 
   for (first = 0; first < count; first += 16) {
     const unsigned int n = count - first < 16 ? count - first : 16;
     load_packet(rays, first, n, &packet.ray, valid);
-    for (k = 0; k < 16; ++k) packet.hit.geomID[k] = packet.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
+    for (k = 0; k < 16; ++k)
+      packet.hit.primID[k] = packet.hit.geomID[k] = packet.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
     em_intersect16(valid, scene, query, &packet);
     for (k = 0; k < n; ++k)
       if (packet.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID) break;

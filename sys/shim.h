@@ -68,8 +68,8 @@ typedef struct EmRays {
   float* tfar;
 } EmRays;
 
-/* Where hits are written, in plain arrays; geomID and instID must hold RTC_INVALID_GEOMETRY_ID before. Normals are
- * not wanted. */
+/* Where hits are written, in plain arrays. A miss leaves the ids as they were or sets them to
+ * RTC_INVALID_GEOMETRY_ID, so at least one of primID and geomID should hold that before. Normals are not wanted. */
 typedef struct EmHits {
   float* u;
   float* v;

@@ -28,11 +28,11 @@ impl Ray {
     /// among them, would abort the process on them.
     #[inline]
     pub fn is_valid(&self) -> bool {
-        let s = self.o.abs().max_element();
-        let l = self.d.abs().max_element();
-        // NaN fails every comparison. The bounds keep t and its products inside f32 for any scene that the builder
-        // accepts (it scales scenes to a size of about one).
-        s <= MAX_COORDINATE && (1e-18..=1e18).contains(&l) && self.tnear >= 0.0 && self.tfar >= self.tnear
+        let (o, d) = (self.o.abs(), self.d.abs());
+        // NaN fails every comparison, but is lost by a maximum: so compare first. The bounds keep t and its products
+        // inside f32 for any scene that the builder accepts (it scales scenes to a size of about one).
+        let finite = o.cmple(Vec3::splat(MAX_COORDINATE)).all() && d.cmple(Vec3::splat(1e18)).all();
+        finite && d.max_element() >= 1e-18 && self.tnear >= 0.0 && self.tfar >= self.tnear
     }
 }
 

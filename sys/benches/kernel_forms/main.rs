@@ -9,7 +9,7 @@
 mod rays;
 
 use embree_sys::*;
-use rays::{BATCH, Batch, no_hit, no_hits, rays, scene, zeroed};
+use rays::{BATCH, Batch, no_hit, no_hits, rays, scattered, scene, zeroed};
 use std::hint::black_box;
 use std::ptr;
 use std::sync::LazyLock;
@@ -160,6 +160,7 @@ fn main() {
     let triangles = std::env::args().skip(1).find_map(|a| a.parse().ok()).unwrap_or(300_000);
     let (scene, triangles) = scene(triangles);
     let [camera, bounce] = rays(scene);
+    let scattered = scattered();
     println!(
         "Embree {EM_MAJOR}.{EM_MINOR}.{EM_PATCH} by its header, robust, {triangles} triangles, one thread"
     );
@@ -177,11 +178,15 @@ fn main() {
         ("stream of 64 packets", any_stream16),
         ("plain arrays", any_soa),
     ];
-    for (what, forms, batches) in [
+    let kinds = [
         ("camera, closest", closest, &camera),
+        ("camera, any", any, &camera),
         ("bounce, closest", closest, &bounce),
         ("bounce, any", any, &bounce),
-    ] {
+        ("scattered, closest", closest, &scattered),
+        ("scattered, any", any, &scattered),
+    ];
+    for (what, forms, batches) in kinds {
         let rows: Vec<_> =
             [false, true].iter().flat_map(|&c| forms.map(|(name, form)| (name, c, form))).collect();
         let mut seconds = vec![Vec::new(); rows.len()];

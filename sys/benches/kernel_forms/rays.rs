@@ -199,6 +199,20 @@ pub fn rays(scene: RTCScene) -> [Vec<Batch>; 2] {
     [camera, bounce]
 }
 
+/// Rays from anywhere to anywhere, which have nothing in common: the worst that late bounces can be.
+pub fn scattered() -> Vec<Batch> {
+    let mut random = Random(2);
+    let mut batches = vec![Batch::default(); 128];
+    for batch in &mut batches {
+        for _ in 0..BATCH {
+            let mut point = || [(); 3].map(|()| 4.0 * random.next() - 2.0);
+            let (from, to) = (point(), point());
+            batch.push(from, normalize([0, 1, 2].map(|k| to[k] - from[k])));
+        }
+    }
+    batches
+}
+
 /// A ray that leaves a hit on the camera's side.
 fn leave(h: &RTCRayHit, random: &mut Random) -> ([f32; 3], [f32; 3]) {
     let (r, t) = (&h.ray, h.ray.tfar);
