@@ -8,6 +8,7 @@ pub mod color;
 pub mod error;
 pub mod formats;
 pub mod image;
+pub mod integrators;
 pub mod lights;
 pub mod materials;
 pub mod math;

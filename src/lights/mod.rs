@@ -5,6 +5,7 @@ pub mod area;
 mod directional;
 mod point;
 pub mod sampler;
+pub mod sky;
 
 use crate::base::light::LightSource;
 use crate::base::registry::Row;

@@ -1,4 +1,173 @@
-//! L4: how a scene becomes a film.
+//! L4: how a scene becomes a film: the [`Renderer`] deals blocks of pixels to threads, round by round.
 
+pub mod aov;
+pub mod block;
 pub mod film;
 pub mod fixed;
+pub mod layers;
+pub mod settings;
+
+use crate::base::pixel_rect::PixelRect;
+use crate::error::{Error, Result};
+use crate::integrators::{Integrator, RayCounts};
+use crate::scene::Scene;
+use block::{BadSample, Job, Worker};
+use film::{Film, REPLICATES};
+use layers::Layers;
+use rayon::prelude::*;
+use settings::RenderSettings;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+/// Told of a render's progress from its worker threads, and asked whether to go on.
+pub trait Progress: Sync {
+    /// The most samples that will be taken.
+    fn begin(&self, _samples: u64) {}
+
+    /// So many more have been taken.
+    fn advance(&self, _samples: u64) {}
+
+    /// Whether the render shall stop with what it has; asked once a tile.
+    fn should_stop(&self) -> bool {
+        false
+    }
+}
+
+/// No progress is shown.
+pub struct Silent;
+
+impl Progress for Silent {}
+
+/// What a render brings back.
+pub struct Rendered {
+    /// The picture's exact sums.
+    pub film: Film,
+    /// Further layers.
+    pub layers: Layers,
+    /// Counts and times.
+    pub stats: RenderStats,
+}
+
+/// Counts and times of a render.
+#[derive(Debug, Clone, Default)]
+pub struct RenderStats {
+    /// Seconds from the first ray to the last.
+    pub seconds: f64,
+    /// Samples a pixel in the film.
+    pub spp: u32,
+    /// Samples taken.
+    pub samples: u64,
+    /// Rays by kind.
+    pub rays: RayCounts,
+    /// Samples that were not finite and were left black.
+    pub dropped: u64,
+    /// The first few of them.
+    pub bad: Vec<BadSample>,
+    /// Whether it was stopped before its last tile.
+    pub interrupted: bool,
+}
+
+/// Decides how a scene is traced.
+pub struct Renderer {
+    /// What is estimated along each path.
+    pub integrator: Arc<dyn Integrator>,
+    /// How many, how, where.
+    pub settings: RenderSettings,
+}
+
+impl Renderer {
+    /// Renders; the film depends on the scene and the settings alone (and, with a time limit, on how many rounds
+    /// the clock allowed). Errors on bad settings and on a failure inside a kernel's callbacks.
+    pub fn render(&self, scene: &Scene, progress: &dyn Progress) -> Result<Rendered> {
+        self.settings.check()?;
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(self.settings.threads.max(1))
+            .build()
+            .map_err(|e| Error::Internal(format!("cannot start {} threads: {e}", self.settings.threads)))?;
+        pool.install(|| self.render_rounds(scene, progress))
+    }
+
+    fn render_rounds(&self, scene: &Scene, progress: &dyn Progress) -> Result<Rendered> {
+        let s = &self.settings;
+        let start = Instant::now();
+        let crop = s.crop;
+        progress.begin(crop.area() as u64 * u64::from(s.spp));
+        let mut out = Rendered {
+            film: Film::new(s.size[0], s.size[1], crop),
+            layers: Layers::new(crop, &s.aovs),
+            stats: RenderStats::default(),
+        };
+        let workers = Mutex::new(Vec::<Worker>::new());
+        let mut done = 0;
+        while done < s.spp && s.time.is_none_or(|t| done == 0 || start.elapsed() < t) {
+            let end = done + round_size(done, s.time).min(s.spp - done);
+            let interrupted = self.render_round(scene, done..end, &workers, &mut out, progress)?;
+            done = end;
+            if interrupted {
+                out.stats.interrupted = true;
+                break;
+            }
+        }
+        let stats = &mut out.stats;
+        stats.spp = done;
+        stats.seconds = start.elapsed().as_secs_f64();
+        for w in lock(&workers).drain(..) {
+            stats.rays.add(&w.work.counts);
+            stats.bad.extend(w.bad);
+        }
+        stats.samples = stats.rays.camera;
+        stats.dropped = out.film.counts().dropped;
+        stats.bad.sort_by_key(|b| (b.y, b.x, b.replicate, b.index));
+        stats.bad.truncate(8);
+        Ok(out)
+    }
+
+    /// One round over all tiles; says whether it was stopped on the way.
+    fn render_round(
+        &self,
+        scene: &Scene,
+        range: std::ops::Range<u32>,
+        workers: &Mutex<Vec<Worker>>,
+        out: &mut Rendered,
+        progress: &dyn Progress,
+    ) -> Result<bool> {
+        let job = Job { scene, integrator: self.integrator.as_ref(), settings: &self.settings };
+        let stopped = AtomicBool::new(false);
+        let sums = Mutex::new((&mut out.film, &mut out.layers));
+        let samples = u64::from(range.end - range.start);
+        let tiles: Vec<PixelRect> = lock(&sums).0.tiles().collect();
+        tiles.into_par_iter().with_max_len(1).try_for_each(|rect| {
+            if stopped.load(Ordering::Relaxed) || progress.should_stop() {
+                stopped.store(true, Ordering::Relaxed);
+                return Ok(());
+            }
+            let idle = lock(workers).pop();
+            let mut worker = idle.unwrap_or_else(|| Worker::new(&self.settings));
+            worker.render_tile(&job, rect, range.clone());
+            scene.kernel.take_failure()?;
+            let mut sums = lock(&sums);
+            sums.0.add_tile(&worker.film);
+            sums.1.merge(&worker.layers);
+            drop(sums);
+            lock(workers).push(worker);
+            progress.advance(rect.area() as u64 * samples);
+            Ok::<(), Error>(())
+        })?;
+        Ok(stopped.into_inner())
+    }
+}
+
+/// A panic elsewhere has already failed the render; the data behind the lock is sums, which stay sums.
+fn lock<T>(m: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    m.lock().unwrap_or_else(|e| e.into_inner())
+}
+
+/// Without a clock one round does it all. With one, rounds double, so that the count stays a power of two times
+/// the replicates as long as possible, where the points are best.
+fn round_size(done: u32, time: Option<Duration>) -> u32 {
+    match time {
+        None => u32::MAX,
+        Some(_) => done.max(4 * REPLICATES as u32),
+    }
+}

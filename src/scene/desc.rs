@@ -1,6 +1,7 @@
 //! A scene as plain data: what every file format produces and the scene builder reads.
 
 use crate::base::registry::Node;
+use crate::cameras::View;
 use crate::error::Place;
 use glam::DAffine3;
 
@@ -9,8 +10,10 @@ use glam::DAffine3;
 pub struct SceneDesc {
     /// The picture.
     pub film: FilmDesc,
-    /// The camera; None frames the bounds of the scene.
+    /// The camera; None frames the bounds of the scene from `view`.
     pub camera: Option<Node>,
+    /// From where a camera that frames the bounds looks.
+    pub view: View,
     /// How it is rendered, as far as the file says.
     pub render: RenderDesc,
     /// The sky; None is darkness.

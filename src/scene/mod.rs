@@ -1,3 +1,140 @@
-//! L3: the scene, as plain data and as built.
+//! L3: the scene, as plain data ([`desc`]) and as built ([`Scene`]), immutable from then on.
 
+pub mod build;
 pub mod desc;
+pub mod features;
+mod groups;
+
+use crate::base::camera::Camera;
+use crate::base::geometry::Geometry;
+use crate::base::hit::Hit;
+use crate::base::intersectable::Intersectable;
+use crate::base::light::{Light, LightSampler, PathEnd, Receiver};
+use crate::base::material::Material;
+use crate::base::ray::Ray;
+use crate::base::shape::Dropped;
+use crate::base::space::RenderSpace;
+use crate::base::vertex::{Origin, Vertex, local_ray};
+use crate::color::Rgb;
+use desc::Background;
+use features::Features;
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// A scene ready to be traced; owns everything, and workers borrow it.
+pub struct Scene {
+    /// What the kernel was given.
+    pub geometry: Arc<Geometry>,
+    /// The ray kernel.
+    pub kernel: Box<dyn Intersectable>,
+    /// Objects, as leaves name them.
+    pub objects: Vec<Object>,
+    /// All lights.
+    pub lights: Lights,
+    /// The camera, in render space.
+    pub camera: Arc<dyn Camera>,
+    /// What camera rays that meet nothing show.
+    pub background: Background,
+    /// From world to render space.
+    pub space: RenderSpace,
+    /// What this scene needs, decided once.
+    pub features: Features,
+    /// What was counted while building.
+    pub report: BuildReport,
+}
+
+/// A placed object's look and name. Objects of one group that is placed many times are one object.
+pub struct Object {
+    /// Name in the scene file, or made up from its kind.
+    pub name: String,
+    /// Materials by slot; never empty.
+    pub materials: Vec<Arc<dyn Material>>,
+}
+
+/// The lights of a scene and the choice between them.
+pub struct Lights {
+    /// In a fixed order.
+    pub list: Vec<Arc<dyn Light>>,
+    /// Chooses among `list`.
+    pub sampler: Box<dyn LightSampler>,
+    /// Those that paths which leave the scene end on.
+    pub at_infinity: Vec<u32>,
+    /// The light of each emitting leaf, by instance path.
+    pub by_path: HashMap<u64, u32>,
+}
+
+/// Counts and times of a build.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct BuildReport {
+    /// Triangles handed to the kernel, each instanced mesh once.
+    pub triangles: u64,
+    /// Other primitives handed to the kernel.
+    pub procedurals: u64,
+    /// Groups, the root among them.
+    pub groups: usize,
+    /// Leaf paths: placements of shapes, instances counted each.
+    pub paths: u64,
+    /// Primitives left out because no ray can hit them.
+    pub dropped: Dropped,
+    /// Bytes of meshes and other shapes.
+    pub geometry_bytes: u64,
+    /// Seconds spent on shapes, lights and everything but the kernel.
+    pub scene_seconds: f64,
+    /// Seconds the kernel took to build.
+    pub kernel_seconds: f64,
+}
+
+impl Scene {
+    /// The surface point of a hit; `spread` is the width of the ray per unit of distance.
+    #[inline]
+    pub fn vertex(&self, ray: &Ray, hit: Hit, spread: f32) -> Vertex {
+        let found = self.geometry.resolve(hit.path);
+        let placement = found.placement.as_ref();
+        let local = local_ray(ray, placement);
+        let surface = found.leaf.shape.refine(&local, hit.prim, hit.t, self.features.needs);
+        let material = &self.objects[found.leaf.object as usize].materials;
+        let slot = if material.len() > 1 { found.leaf.shape.material_slot(hit.prim) } else { 0 };
+        Vertex::new(
+            ray,
+            &surface,
+            placement,
+            Origin { hit, object: found.leaf.object, slot: slot as u32, spread },
+        )
+    }
+
+    /// The material at a vertex.
+    #[inline]
+    pub fn material(&self, v: &Vertex) -> &dyn Material {
+        self.objects[v.object as usize].materials[v.slot as usize].as_ref()
+    }
+}
+
+/// What a path finds at its end, from one light.
+#[derive(Debug, Clone, Copy)]
+pub struct Emitted {
+    /// Radiance towards the path.
+    pub le: Rgb,
+    /// Density per solid angle with which light sampling would have found this end, choice of light included.
+    pub pdf: f32,
+}
+
+impl Lights {
+    /// The light that a vertex lies on.
+    #[inline]
+    pub fn of_vertex(&self, v: &Vertex) -> Option<u32> {
+        self.by_path.get(&v.path).copied()
+    }
+
+    /// What `light` sends along a path that ends at `end`, and the density of sampling it from `from`; None from
+    /// the camera or a delta lobe, for which light sampling could not have found it.
+    #[inline]
+    pub fn emitted(&self, light: u32, end: &PathEnd, from: Option<&Receiver>) -> Emitted {
+        let l = &self.list[light as usize];
+        let le = l.le(end);
+        let pdf = match from {
+            Some(r) if !le.is_black() => self.sampler.pmf(r, light) * l.pdf_li(r, end),
+            _ => 0.0,
+        };
+        Emitted { le, pdf }
+    }
+}

@@ -1,0 +1,143 @@
+#!/usr/bin/env python3
+"""Renders one mesh under one equirectangular sky with Mitsuba 3, for comparison with skylit.
+
+    pip install mitsuba numpy
+    python3 benches/peers/mitsuba_render.py MESH.ply SKY.exr -o out.exr [options]
+
+SKY.exr is equirectangular in skylit's convention (the middle column looks along +x); skylit writes such a picture of
+any sky with the camera type "equirectangular" (see benches/README.md). Times go to stdout as JSON: `first` includes
+the compilation of the LLVM variants' kernel, `render` is the median of the later runs.
+"""
+import argparse
+import json
+import statistics
+import time
+
+import numpy as np
+
+
+def arguments():
+    p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    p.add_argument("mesh")
+    p.add_argument("sky")
+    p.add_argument("-o", "--output", required=True)
+    p.add_argument("--variant", default="llvm_ad_rgb", choices=["llvm_ad_rgb", "scalar_rgb"])
+    p.add_argument("--size", default="1920x1080")
+    p.add_argument("--spp", type=int, default=50)
+    p.add_argument("--runs", type=int, default=5)
+    p.add_argument("--threads", type=int, default=0, help="0 means all cores")
+    p.add_argument("--seed", type=int, default=0)
+    p.add_argument("--integrator", default="direct", choices=["direct", "direct-bsdf", "path", "depth"])
+    p.add_argument("--max-depth", type=int, default=6, help="surfaces, the camera's hit counted as 1")
+    p.add_argument("--sampler", default="multijitter")
+    p.add_argument("--rfilter", default="box")
+    p.add_argument("--albedo", type=float, default=0.8)
+    p.add_argument("--metal-roughness", type=float, help="a white GGX conductor instead of diffuse; alpha = roughness^2")
+    p.add_argument("--eye", default="5,0,0")
+    p.add_argument("--look-at", default="0,0,0")
+    p.add_argument("--fov", type=float, default=60.0)
+    p.add_argument("--fit", type=float, help="centre the mesh by its bounds and scale its longest side to this")
+    p.add_argument("--rotate-y", type=float, default=0.0, help="degrees, after --fit")
+    return p.parse_args()
+
+
+def integrator(a):
+    if a.integrator == "direct":
+        return {"type": "direct", "emitter_samples": 1, "bsdf_samples": 1}
+    if a.integrator == "direct-bsdf":
+        return {"type": "direct", "emitter_samples": 0, "bsdf_samples": 1}
+    if a.integrator == "depth":
+        return {"type": "depth"}
+    # Mitsuba counts path edges: depth 2 is direct light.
+    return {"type": "path", "max_depth": a.max_depth + 1, "rr_depth": 1000}
+
+
+def material(a):
+    if a.metal_roughness is not None:
+        return {
+            "type": "roughconductor",
+            "material": "none",
+            "distribution": "ggx",
+            "alpha": a.metal_roughness**2,
+        }
+    return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [a.albedo] * 3}}}
+
+
+def scene(mi, a):
+    T = mi.ScalarTransform4f
+    mesh = {"type": "obj" if a.mesh.lower().endswith(".obj") else "ply", "filename": a.mesh, "bsdf": material(a)}
+    if a.fit:
+        box = mi.load_dict({**mesh, "face_normals": True}).bbox()
+        size = max(box.max[i] - box.min[i] for i in range(3))
+        mesh["to_world"] = (
+            T().rotate([0, 1, 0], a.rotate_y) @ T().scale(a.fit / size) @ T().translate([-c for c in box.center()])
+        )
+    sky = np.array(mi.Bitmap(a.sky).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
+    # Mitsuba's middle column looks along +z, a quarter of the width from ours.
+    sky = np.roll(sky, -(sky.shape[1] // 4), axis=1)
+    width, height = map(int, a.size.split("x"))
+    vector = lambda s: [float(x) for x in s.split(",")]
+    return {
+        "type": "scene",
+        "integrator": integrator(a),
+        "mesh": mesh,
+        "sky": {"type": "envmap", "bitmap": mi.Bitmap(np.ascontiguousarray(sky))},
+        "sensor": {
+            "type": "perspective",
+            "fov": a.fov,
+            "fov_axis": "y",
+            "to_world": T().look_at(origin=vector(a.eye), target=vector(a.look_at), up=[0, 1, 0]),
+            "film": {
+                "type": "hdrfilm",
+                "width": width,
+                "height": height,
+                "rfilter": {"type": a.rfilter},
+                "pixel_format": "rgb",
+                "component_format": "float32",
+            },
+            "sampler": {"type": a.sampler, "sample_count": a.spp},
+        },
+    }
+
+
+def main():
+    a = arguments()
+    import drjit as dr
+    import mitsuba as mi
+
+    mi.set_variant(a.variant)
+    if a.threads:
+        dr.set_thread_count(a.threads)
+    start = time.perf_counter()
+    built = mi.load_dict(scene(mi, a))
+    load = time.perf_counter() - start
+    times = []
+    image = None
+    for i in range(a.runs + 1):
+        start = time.perf_counter()
+        image = mi.render(built, spp=a.spp, seed=a.seed + i)
+        dr.eval(image)
+        dr.sync_thread()
+        times.append(time.perf_counter() - start)
+    mi.Bitmap(image).write(a.output)
+    later = times[1:] or times
+    print(
+        json.dumps(
+            {
+                "program": "mitsuba " + mi.__version__,
+                "variant": a.variant,
+                "integrator": a.integrator,
+                "sampler": a.sampler,
+                "size": a.size,
+                "spp": a.spp,
+                "load": load,
+                "first": times[0],
+                "render": statistics.median(later),
+                "runs": times,
+            }
+        )
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,130 @@
+//! L3: integrators advance a block of paths together: all rays of one depth go to the kernel as one batch. They
+//! know the nouns of `base` and the [`Scene`], and name no kind of anything.
+
+pub mod ambient_occlusion;
+pub mod direct;
+pub mod normals;
+pub mod path;
+
+use crate::base::hit::HitBatch;
+use crate::base::ray::RayBatch;
+use crate::base::registry::Row;
+use crate::base::vertex::Vertex;
+use crate::color::Rgb;
+use crate::sampler::PixelSampler;
+use crate::scene::Scene;
+
+/// Every integrator, by name.
+pub static REGISTRY: &[Row<dyn Integrator>] = &[path::ROW, direct::ROW, ambient_occlusion::ROW, normals::ROW];
+
+/// Which sample of which pixel a path is.
+#[derive(Debug, Clone, Copy)]
+pub struct PathId {
+    /// The points of its pixel and replicate.
+    pub sampler: PixelSampler,
+    /// Its index among them.
+    pub index: u32,
+    /// Hash of its pixel and replicate, for ray keys.
+    pub key: u32,
+}
+
+/// A block of camera rays.
+#[derive(Default)]
+pub struct CameraBatch {
+    /// The rays, of unit direction, neighbours in the batch close together.
+    pub rays: RayBatch,
+    /// Their identities.
+    pub ids: Vec<PathId>,
+    /// Width of a camera ray per unit of distance.
+    pub spread: f32,
+    /// Whether [`PathResults::first`] is wanted.
+    pub want_first: bool,
+}
+
+/// The first surface of a path, from which AOVs read.
+#[derive(Debug, Clone, Copy)]
+pub struct FirstHit {
+    /// The surface point.
+    pub vertex: Vertex,
+    /// The material's albedo there.
+    pub albedo: Rgb,
+}
+
+/// What a block of paths brings back, one entry a path.
+#[derive(Default)]
+pub struct PathResults {
+    /// Radiance.
+    pub li: Vec<Rgb>,
+    /// 1 where the camera ray met something, else 0.
+    pub alpha: Vec<f32>,
+    /// First surfaces, if asked for; else empty.
+    pub first: Vec<Option<FirstHit>>,
+}
+
+impl PathResults {
+    /// Black and transparent, `n` times.
+    pub fn reset(&mut self, n: usize, want_first: bool) {
+        self.li.clear();
+        self.li.resize(n, Rgb::BLACK);
+        self.alpha.clear();
+        self.alpha.resize(n, 0.0);
+        self.first.clear();
+        self.first.resize(if want_first { n } else { 0 }, None);
+    }
+}
+
+/// Rays counted by kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct RayCounts {
+    /// From the camera.
+    pub camera: u64,
+    /// Scattered, for the closest hit.
+    pub scattered: u64,
+    /// Asking only whether anything is in the way.
+    pub shadow: u64,
+}
+
+impl RayCounts {
+    /// Adds another count.
+    pub fn add(&mut self, o: &RayCounts) {
+        self.camera += o.camera;
+        self.scattered += o.scattered;
+        self.shadow += o.shadow;
+    }
+
+    /// Of all kinds.
+    pub fn total(&self) -> u64 {
+        self.camera + self.scattered + self.shadow
+    }
+}
+
+/// Memory that a thread keeps from block to block, so that nothing is allocated on the way.
+#[derive(Default)]
+pub struct Workspace {
+    /// Rays of the present depth.
+    pub rays: RayBatch,
+    /// Rays of the next depth.
+    pub next: RayBatch,
+    /// Hits of the present depth.
+    pub hits: HitBatch,
+    /// Rays that only ask whether anything is in the way.
+    pub shadow: RayBatch,
+    /// Answers to them.
+    pub blocked: Vec<bool>,
+    /// Which path each of `shadow` belongs to, for integrators that keep no more of it.
+    pub indices: Vec<u32>,
+    /// Rays traced so far.
+    pub counts: RayCounts,
+    /// State of the path integrators.
+    pub paths: path::PathScratch,
+}
+
+/// Estimates the radiance along a block of camera rays.
+pub trait Integrator: Send + Sync {
+    /// Fills `out` (reset by the integrator) for every ray of the batch. Results depend on each path's identity
+    /// alone, not on what else is in the batch.
+    fn trace(&self, scene: &Scene, batch: &CameraBatch, work: &mut Workspace, out: &mut PathResults);
+
+    /// Sampler dimensions beyond the camera's that a path may use, for information.
+    fn describe(&self) -> String;
+}

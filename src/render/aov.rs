@@ -1,0 +1,100 @@
+//! Layers beside the picture, read from the first surface of each path.
+
+use crate::error::{Error, Result, unknown_name};
+use crate::integrators::FirstHit;
+use crate::scene::Scene;
+
+/// How a pixel's values are brought together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Combine {
+    /// Mean over the samples that hit something.
+    Mean,
+    /// The pixel's first sample alone, for values that cannot be averaged.
+    First,
+}
+
+/// A registered layer.
+pub struct AovRow {
+    /// Name on the command line and prefix of its channels in a file.
+    pub name: &'static str,
+    /// One line for `skylit list`.
+    pub doc: &'static str,
+    /// Channel suffixes, at most four.
+    pub channels: &'static [&'static str],
+    /// Whether half precision would lose what matters.
+    pub full_precision: bool,
+    /// See [`Combine`].
+    pub combine: Combine,
+    /// The value at a first surface; as many entries count as there are channels.
+    pub eval: fn(&FirstHit, &Scene) -> [f32; 4],
+}
+
+/// Every layer that reads first surfaces. `variance` and `spp` are layers of the film itself.
+pub static REGISTRY: &[AovRow] = &[
+    AovRow {
+        name: "albedo",
+        doc: "reflectance of the first surface, for denoisers",
+        channels: &["R", "G", "B"],
+        full_precision: false,
+        combine: Combine::Mean,
+        eval: |h, _| [h.albedo.r, h.albedo.g, h.albedo.b, 0.0],
+    },
+    AovRow {
+        name: "normal",
+        doc: "unit shading normal in world axes, towards the viewer's side",
+        channels: &["X", "Y", "Z"],
+        full_precision: false,
+        combine: Combine::Mean,
+        eval: |h, _| {
+            let n = h.vertex.receiver().ns;
+            [n.x, n.y, n.z, 0.0]
+        },
+    },
+    AovRow {
+        name: "depth",
+        doc: "distance from the camera along the ray, metres",
+        channels: &["Z"],
+        full_precision: true,
+        combine: Combine::Mean,
+        eval: |h, scene| [scene.space.world_length(f64::from(h.vertex.t)) as f32, 0.0, 0.0, 0.0],
+    },
+    AovRow {
+        name: "position",
+        doc: "point in world space, metres",
+        channels: &["X", "Y", "Z"],
+        full_precision: true,
+        combine: Combine::Mean,
+        eval: |h, scene| {
+            let p = scene.space.world_point(h.vertex.p.as_dvec3()).as_vec3();
+            [p.x, p.y, p.z, 0.0]
+        },
+    },
+    AovRow {
+        name: "id",
+        doc: "number of the object, from 1 in the order of `skylit info`; 0 where there is none",
+        channels: &["V"],
+        full_precision: true,
+        combine: Combine::First,
+        eval: |h, _| [h.vertex.object as f32 + 1.0, 0.0, 0.0, 0.0],
+    },
+];
+
+/// Names of the layers that the film itself gives.
+pub const FILM_LAYERS: [(&str, &str); 2] = [
+    ("variance", "variance of the pixel's mean, per channel, estimated from its two half-buffers"),
+    ("spp", "samples of the pixel"),
+];
+
+/// Finds layers by their names; the film's own are left out.
+pub fn find(names: &[&str]) -> Result<Vec<&'static AovRow>> {
+    let known = || REGISTRY.iter().map(|r| r.name).chain(FILM_LAYERS.iter().map(|f| f.0));
+    let mut rows = Vec::new();
+    for &name in names {
+        match REGISTRY.iter().find(|r| r.name == name) {
+            Some(row) => rows.push(row),
+            None if FILM_LAYERS.iter().any(|f| f.0 == name) => {}
+            None => return Err(Error::Usage(unknown_name("layer", name, known()))),
+        }
+    }
+    Ok(rows)
+}

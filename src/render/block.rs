@@ -1,0 +1,213 @@
+//! The unit of work of a thread: a tile of pixels, its samples dealt out in batches of camera rays.
+
+use super::film::{FilmSample, FilmTile, REPLICATES};
+use super::layers::Layers;
+use super::settings::RenderSettings;
+use crate::base::camera::FilmSamples;
+use crate::base::pixel_rect::PixelRect;
+use crate::integrators::{CameraBatch, Integrator, PathId, PathResults, Workspace};
+use crate::sampler::{Dim, ray_key};
+use crate::scene::Scene;
+use glam::Vec2;
+use std::ops::Range;
+
+/// Rays that are traced together. Large enough that the kernel's batches and the loops over columns run long,
+/// small enough that a block's state stays in the second-level cache (about 100 bytes a ray).
+const BATCH: usize = 2048;
+
+/// A non-finite sample, kept for the report.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BadSample {
+    /// Pixel.
+    pub x: u32,
+    /// Pixel.
+    pub y: u32,
+    /// Which randomisation of the pixel's points.
+    pub replicate: u32,
+    /// Index among them.
+    pub index: u32,
+}
+
+/// Consecutive samples of one pixel and replicate within a batch.
+#[derive(Clone, Copy)]
+struct Run {
+    x: u32,
+    y: u32,
+    replicate: u32,
+    first_index: u32,
+    start: usize,
+    len: usize,
+}
+
+/// What one thread keeps from tile to tile.
+pub struct Worker {
+    /// The tile's sums.
+    pub film: FilmTile,
+    /// The tile's further layers.
+    pub layers: Layers,
+    samples: Vec<FilmSample>,
+    runs: Vec<Run>,
+    film_x: Vec<f32>,
+    film_y: Vec<f32>,
+    lens_u: Vec<f32>,
+    lens_v: Vec<f32>,
+    batch: CameraBatch,
+    results: PathResults,
+    /// Scratch memory and ray counts.
+    pub work: Workspace,
+    /// Samples that were not finite, the first few.
+    pub bad: Vec<BadSample>,
+}
+
+/// What all tiles of a render share.
+#[derive(Clone, Copy)]
+pub struct Job<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// The integrator.
+    pub integrator: &'a dyn Integrator,
+    /// The settings.
+    pub settings: &'a RenderSettings,
+}
+
+/// Indices of replicate `r` among the samples `range` of a pixel: sample s is number s / R of replicate s mod R.
+pub fn replicate_indices(range: &Range<u32>, r: u32) -> Range<u32> {
+    let first = |s: u32| s.saturating_sub(r).div_ceil(REPLICATES as u32);
+    first(range.start)..first(range.end)
+}
+
+impl Worker {
+    /// A worker for a render.
+    pub fn new(settings: &RenderSettings) -> Self {
+        Worker {
+            film: FilmTile::new(PixelRect::default()),
+            layers: Layers::new(PixelRect::default(), &settings.aovs),
+            samples: Vec::new(),
+            runs: Vec::new(),
+            film_x: Vec::new(),
+            film_y: Vec::new(),
+            lens_u: Vec::new(),
+            lens_v: Vec::new(),
+            batch: CameraBatch::default(),
+            results: PathResults::default(),
+            work: Workspace::default(),
+            bad: Vec::new(),
+        }
+    }
+
+    /// Renders the samples `range` of every pixel of a tile; the sums are then in `film` and `layers`.
+    pub fn render_tile(&mut self, job: &Job, rect: PixelRect, range: Range<u32>) {
+        self.film.reset(rect);
+        self.layers.reset(rect);
+        self.batch.spread = job.scene.camera.pixel_spread();
+        self.batch.want_first = !job.settings.aovs.is_empty();
+        for (x, y) in rect.pixels() {
+            for replicate in 0..REPLICATES as u32 {
+                let indices = replicate_indices(&range, replicate);
+                let mut first = indices.start;
+                while first < indices.end {
+                    let room = BATCH - self.film_x.len();
+                    let len = room.min((indices.end - first) as usize);
+                    self.add_run(
+                        job,
+                        Run { x, y, replicate, first_index: first, start: self.film_x.len(), len },
+                    );
+                    first += len as u32;
+                    if self.film_x.len() == BATCH {
+                        self.flush(job);
+                    }
+                }
+            }
+        }
+        self.flush(job);
+    }
+
+    /// Film and lens positions of a run.
+    fn add_run(&mut self, job: &Job, run: Run) {
+        let s = job.settings;
+        let end = run.start + run.len;
+        let sampler = s.sampler.pixel(s.seed, run.x, run.y, run.replicate);
+        self.film_x.resize(end, 0.5);
+        self.film_y.resize(end, 0.5);
+        let (xs, ys) = (&mut self.film_x[run.start..], &mut self.film_y[run.start..]);
+        if s.spp == 1 {
+            // A single sample goes through the pixel's centre.
+            xs.fill(run.x as f32 + 0.5);
+            ys.fill(run.y as f32 + 0.5);
+        } else {
+            sampler.fill_2d(run.first_index, Dim::FILTER, xs, ys);
+            for (x, y) in xs.iter_mut().zip(ys) {
+                let offset = s.filter.sample(Vec2::new(*x, *y));
+                *x = run.x as f32 + 0.5 + offset.x;
+                *y = run.y as f32 + 0.5 + offset.y;
+            }
+        }
+        if job.scene.camera.has_lens() {
+            self.lens_u.resize(end, 0.5);
+            self.lens_v.resize(end, 0.5);
+            let (us, vs) = (&mut self.lens_u[run.start..], &mut self.lens_v[run.start..]);
+            sampler.fill_2d(run.first_index, Dim::LENS, us, vs);
+        }
+        let key = ray_key(run.x, run.y, run.replicate);
+        self.batch.ids.extend((0..run.len as u32).map(|i| PathId {
+            sampler,
+            index: run.first_index + i,
+            key,
+        }));
+        self.runs.push(run);
+    }
+
+    /// Traces what has been gathered and adds it to the tile.
+    fn flush(&mut self, job: &Job) {
+        if self.film_x.is_empty() {
+            return;
+        }
+        let samples =
+            FilmSamples { x: &self.film_x, y: &self.film_y, lens_u: &self.lens_u, lens_v: &self.lens_v };
+        job.scene.camera.fill_rays(&samples, &mut self.batch.rays);
+        for (ray_key_out, id) in self.batch.rays.key.iter_mut().zip(&self.batch.ids) {
+            *ray_key_out = ray_key(id.key, id.index, 1);
+        }
+        job.integrator.trace(job.scene, &self.batch, &mut self.work, &mut self.results);
+        let runs = std::mem::take(&mut self.runs);
+        for run in &runs {
+            self.collect(run, job);
+        }
+        self.runs = runs;
+        self.runs.clear();
+        self.film_x.clear();
+        self.film_y.clear();
+        self.lens_u.clear();
+        self.lens_v.clear();
+        self.batch.ids.clear();
+    }
+
+    /// Adds a run's results to the tile.
+    fn collect(&mut self, run: &Run, job: &Job) {
+        let range = run.start..run.start + run.len;
+        self.samples.clear();
+        for (i, (&radiance, &alpha)) in
+            self.results.li[range.clone()].iter().zip(&self.results.alpha[range.clone()]).enumerate()
+        {
+            // No number aborts a render: what is not finite is left out, counted and reported.
+            if radiance.is_finite() {
+                self.samples.push(FilmSample { radiance, alpha });
+            } else {
+                self.film.drop_sample();
+                if self.bad.len() < 8 {
+                    let index = run.first_index + i as u32;
+                    self.bad.push(BadSample { x: run.x, y: run.y, replicate: run.replicate, index });
+                }
+            }
+        }
+        self.film.add_run(run.x, run.y, run.replicate as usize, &self.samples);
+        if self.batch.want_first {
+            let starts_pixel = run.replicate == 0 && run.first_index == 0;
+            for (i, hit) in self.results.first[range].iter().enumerate() {
+                if let Some(hit) = hit {
+                    self.layers.add(run.x, run.y, hit, starts_pixel && i == 0, job.scene);
+                }
+            }
+        }
+    }
+}

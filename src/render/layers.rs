@@ -1,0 +1,55 @@
+//! Further layers of a picture, summed as exactly as the film itself.
+
+use super::aov::{AovRow, Combine};
+use super::fixed::Accumulator;
+use crate::base::pixel_rect::PixelRect;
+use crate::image::picture::{Picture, SampleKind};
+use crate::integrators::FirstHit;
+use crate::scene::Scene;
+
+/// Room for a layer's channels.
+const CHANNELS: usize = 4;
+
+/// Sums over a window: a thread's tile, or the whole picture.
+pub struct Layers {
+    layers: Vec<(&'static AovRow, Accumulator)>,
+}
+
+impl Layers {
+    /// Empty sums.
+    pub fn new(window: PixelRect, rows: &[&'static AovRow]) -> Self {
+        Layers { layers: rows.iter().map(|&r| (r, Accumulator::new(window, CHANNELS))).collect() }
+    }
+
+    /// Empties them and moves them to another window.
+    pub fn reset(&mut self, window: PixelRect) {
+        self.layers.iter_mut().for_each(|(_, sums)| sums.reset(window));
+    }
+
+    /// Adds a sample's first surface; `is_first` marks the pixel's very first sample.
+    pub fn add(&mut self, x: u32, y: u32, hit: &FirstHit, is_first: bool, scene: &Scene) {
+        for (row, sums) in &mut self.layers {
+            if row.combine == Combine::Mean || is_first {
+                // A value that is not finite has no place in a mean; the picture's own samples are checked apart.
+                sums.add::<CHANNELS>(x, y, (row.eval)(hit, scene));
+            }
+        }
+    }
+
+    /// Adds a tile's sums.
+    pub fn merge(&mut self, tile: &Layers) {
+        for ((_, mine), (_, add)) in self.layers.iter_mut().zip(&tile.layers) {
+            mine.merge(add);
+        }
+    }
+
+    /// Appends the means as planes `NAME.CHANNEL`; 0 where nothing was hit.
+    pub fn push_planes(&self, picture: &mut Picture) {
+        for (row, sums) in &self.layers {
+            let names: Vec<String> = row.channels.iter().map(|c| format!("{}.{c}", row.name)).collect();
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            let kind = if row.full_precision { SampleKind::Float } else { SampleKind::Half };
+            sums.push_planes(picture, &names, kind);
+        }
+    }
+}

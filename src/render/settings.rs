@@ -1,0 +1,77 @@
+//! What a render is told beside its scene.
+
+use crate::base::pixel_rect::PixelRect;
+use crate::error::{Error, Result};
+use crate::render::aov::AovRow;
+use crate::sampler::Sampler;
+use crate::sampling::filter::PixelFilter;
+use std::time::Duration;
+
+/// Settings of a render. Two renders with the same scene and settings give the same bits, whatever the threads.
+#[derive(Clone)]
+pub struct RenderSettings {
+    /// Film size in pixels.
+    pub size: [u32; 2],
+    /// The part of the film that is rendered, pixels; all of it by default.
+    pub crop: PixelRect,
+    /// Samples a pixel, at least 1; with a time limit, at most so many.
+    pub spp: u32,
+    /// Rounds are started only while less than this has passed; the picture says how many samples it has.
+    pub time: Option<Duration>,
+    /// Seed of every random choice.
+    pub seed: u64,
+    /// Kind of sample points.
+    pub sampler: Sampler,
+    /// Pixel filter.
+    pub filter: PixelFilter,
+    /// Worker threads, at least 1.
+    pub threads: usize,
+    /// Further layers.
+    pub aovs: Vec<&'static AovRow>,
+}
+
+/// Pixels whose left top corner lies in a window given by fractions of the film (x0, x1, y0, y1 in [0, 1], as pbrt's
+/// `--cropwindow` takes them). Errors where it holds no pixel.
+pub fn crop_window([x0, x1, y0, y1]: [f64; 4], size: [u32; 2]) -> Result<PixelRect> {
+    let inside = |v: f64| (0.0..=1.0).contains(&v);
+    if ![x0, x1, y0, y1].into_iter().all(inside) {
+        return Err(Error::Usage("a crop window takes four numbers from 0 to 1: x0,x1,y0,y1".into()));
+    }
+    let at = |f: f64, n: u32| (f * f64::from(n)).ceil() as u32;
+    let crop = PixelRect::new(at(x0, size[0]), at(y0, size[1]), at(x1, size[0]), at(y1, size[1]));
+    if crop.area() == 0 {
+        return Err(Error::Usage(format!(
+            "the crop window holds no pixel of a {}x{} film: x0 < x1 and y0 < y1 are needed",
+            size[0], size[1]
+        )));
+    }
+    Ok(crop)
+}
+
+impl RenderSettings {
+    /// Defaults for a film of `size`: 64 samples a pixel, all cores.
+    pub fn new(size: [u32; 2]) -> Self {
+        RenderSettings {
+            size,
+            crop: PixelRect::of_size(size[0], size[1]),
+            spp: 64,
+            time: None,
+            seed: 0,
+            sampler: Sampler::default(),
+            filter: PixelFilter::default(),
+            threads: std::thread::available_parallelism().map_or(1, |n| n.get()),
+            aovs: Vec::new(),
+        }
+    }
+
+    /// Checks what the types cannot.
+    pub fn check(&self) -> Result<()> {
+        if self.size.contains(&0) {
+            return Err(Error::Usage("the film needs at least one pixel in each direction".into()));
+        }
+        if self.spp == 0 {
+            return Err(Error::Usage("at least one sample a pixel is needed (--spp 1)".into()));
+        }
+        Ok(())
+    }
+}
