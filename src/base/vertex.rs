@@ -72,12 +72,16 @@ impl Vertex {
         // The rounding of p itself to f32.
         let error = error + p.abs() * UNIT_ROUNDOFF;
         let length = d.length();
-        let footprint = texture_footprint(surface, origin.spread as f64 * surface.t * length);
+        let [dpdu, dpdv] = match placement {
+            None => [surface.dpdu, surface.dpdv],
+            Some(pl) => [surface.dpdu, surface.dpdv].map(|v| pl.to_render.matrix3 * v),
+        };
+        let footprint = texture_footprint([dpdu, dpdv], origin.spread as f64 * surface.t * length);
         Vertex {
             p: p32,
             error: round_up(error),
             ng: ng.as_vec3(),
-            frame: Frame::from_z(ns.as_vec3()),
+            frame: frame_along(ns.as_vec3(), dpdu),
             wo: wo.as_vec3(),
             uv: surface.uv,
             footprint,
@@ -180,9 +184,64 @@ fn step(x: f32, n: f32) -> f32 {
     }
 }
 
+/// The shading frame: its x follows `dpdu` where that is known, so that stretched highlights do.
+fn frame_along(n: Vec3, dpdu: DVec3) -> Frame {
+    let along = dpdu.try_normalize().and_then(|u| Frame::from_zx(n, u.as_vec3()));
+    along.unwrap_or_else(|| Frame::from_z(n))
+}
+
 /// Width of a ray's footprint in uv units: its width in space over the longer tangent. Isotropic and without the
 /// obliquity of the surface, so never wider than the truth.
-fn texture_footprint(s: &Surface, width: f64) -> f32 {
-    let scale = s.dpdu.length_squared().max(s.dpdv.length_squared());
+fn texture_footprint(tangents: [DVec3; 2], width: f64) -> f32 {
+    let scale = tangents[0].length_squared().max(tangents[1].length_squared());
     if scale > 0.0 { (width / scale.sqrt()) as f32 } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DAffine3;
+
+    fn vertex(dpdu: DVec3, placement: Option<&Placement>) -> Vertex {
+        let (p, ng) = (DVec3::new(0.0, 0.0, 1.0), DVec3::Z);
+        let zero = DVec3::ZERO;
+        let surface = Surface {
+            t: 4.0,
+            p,
+            error: zero,
+            ng,
+            ns: ng,
+            uv: Vec2::ZERO,
+            dpdu,
+            dpdv: 0.5 * dpdu.length() * DVec3::Y,
+            lift: zero,
+        };
+        let hit = Hit { path: 0, prim: 0, t: 4.0 };
+        let origin = Origin { hit, object: 0, slot: 0, spread: 0.01 };
+        Vertex::new(&Ray::new(Vec3::new(0.0, 0.0, 5.0), -Vec3::Z, 0), &surface, placement, origin)
+    }
+
+    #[test]
+    fn frames_and_footprints_follow_the_placed_tangents() {
+        // Turned by a quarter about z and scaled by 3: u points along y, and a unit of u is 6 wide.
+        let m =
+            DAffine3::from_rotation_z(std::f64::consts::FRAC_PI_2) * DAffine3::from_scale(DVec3::splat(3.0));
+        let placement = Placement { to_render: m, from_render: m.inverse() };
+        let v = vertex(2.0 * DVec3::X, Some(&placement));
+        assert!((v.frame.s - Vec3::Y).length() < 1e-6 && v.frame.n == Vec3::Z, "{:?}", v.frame);
+        // 0.01 radians at distance 4.
+        assert!((v.footprint - 0.04 / 6.0).abs() < 1e-6, "{}", v.footprint);
+        let v = vertex(2.0 * DVec3::X, None);
+        assert!((v.frame.s - Vec3::X).length() < 1e-6, "{:?}", v.frame);
+        assert!((v.footprint - 0.04 / 2.0).abs() < 1e-6, "{}", v.footprint);
+    }
+
+    #[test]
+    fn without_tangents_any_frame_will_do() {
+        for dpdu in [DVec3::ZERO, DVec3::Z, DVec3::NAN] {
+            let v = vertex(dpdu, None);
+            assert_eq!(v.frame.n, Vec3::Z);
+            assert!((v.frame.s.cross(v.frame.t) - v.frame.n).length() < 1e-6);
+        }
+    }
 }
