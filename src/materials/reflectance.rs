@@ -45,8 +45,16 @@ impl Reflectance {
         }
     }
 
+    /// The value if it is the same everywhere.
+    pub fn constant(&self) -> Option<Rgb> {
+        match &self.0 {
+            TextureOrColor::Color(c) => Some(*c),
+            TextureOrColor::Texture(_) => None,
+        }
+    }
+
     /// Whether it is zero everywhere.
     pub fn is_black(&self) -> bool {
-        matches!(&self.0, TextureOrColor::Color(c) if c.is_black())
+        self.constant().is_some_and(Rgb::is_black)
     }
 }
