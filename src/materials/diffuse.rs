@@ -20,7 +20,7 @@ pub(super) const ROW: Row<dyn Material> = Row {
         default: Some("0.8"),
         doc: "share of the light that is scattered, 0 to 1",
     }],
-    build: |p| Ok(Arc::new(Diffuse::from_params(p)?)),
+    build: |p| Ok(Arc::new(Diffuse::from_params(p, 0.8)?)),
     samples: || {
         vec![
             Params::new(),
@@ -30,13 +30,14 @@ pub(super) const ROW: Row<dyn Material> = Row {
     },
 };
 
-struct Diffuse {
+/// The material; also what scatters on a surface that glows.
+pub(super) struct Diffuse {
     albedo: Reflectance,
 }
 
 impl Diffuse {
-    fn from_params(p: &Params) -> Result<Self> {
-        Ok(Diffuse { albedo: Reflectance::from_params(p, "albedo", [0.8; 3])? })
+    pub(super) fn from_params(p: &Params, default: f64) -> Result<Self> {
+        Ok(Diffuse { albedo: Reflectance::from_params(p, "albedo", [default; 3])? })
     }
 }
 

@@ -1,16 +1,18 @@
-//! A surface that glows and scatters nothing.
+//! A surface that glows, and may scatter as a diffuse one.
 
 use crate::base::material::{BsdfEval, BsdfSample, Emitter, Material, Prepared};
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
+use crate::base::shape::Needs;
 use crate::base::vertex::Vertex;
 use crate::color::Rgb;
 use crate::error::Result;
+use crate::materials::diffuse::Diffuse;
 use glam::{Vec2, Vec3};
 use std::sync::Arc;
 
 pub(super) const ROW: Row<dyn Material> = Row {
     kind: "emissive",
-    doc: "emits the same radiance in every direction, and scatters nothing",
+    doc: "emits the same radiance in every direction; scatters evenly, if it has an albedo",
     params: &[
         ParamSpec {
             name: "radiance",
@@ -24,6 +26,12 @@ pub(super) const ROW: Row<dyn Material> = Row {
             default: Some("false"),
             doc: "whether the back emits too; the front is the side of the geometric normal",
         },
+        ParamSpec {
+            name: "albedo",
+            kind: ParamKind::Texture,
+            default: Some("0"),
+            doc: "share of the light that is scattered, 0 to 1, from both sides",
+        },
     ],
     build: |p| Ok(Arc::new(Emissive::from_params(p)?)),
     samples: || {
@@ -33,6 +41,7 @@ pub(super) const ROW: Row<dyn Material> = Row {
                 .with("radiance", Value::Numbers(vec![10.0, 5.0, 0.0]))
                 .with("two_sided", Value::Bool(true)),
             Params::new().with("radiance", Value::Number(0.0)),
+            Params::new().with("albedo", Value::Number(0.6)),
         ]
     },
 };
@@ -40,6 +49,8 @@ pub(super) const ROW: Row<dyn Material> = Row {
 struct Emissive {
     radiance: Rgb,
     two_sided: bool,
+    /// What scatters.
+    body: Diffuse,
 }
 
 impl Emissive {
@@ -47,27 +58,34 @@ impl Emissive {
         Ok(Emissive {
             radiance: p.color_or("radiance", [1.0; 3])?,
             two_sided: p.bool_or("two_sided", false)?,
+            body: Diffuse::from_params(p, 0.0)?,
         })
     }
 }
 
 impl Material for Emissive {
-    fn prepare(&self, _vertex: &Vertex, _out: &mut Prepared) {}
-
-    fn eval(&self, _m: &Prepared, _wo: Vec3, _wi: Vec3) -> BsdfEval {
-        BsdfEval::default()
+    fn needs(&self) -> Needs {
+        self.body.needs()
     }
 
-    fn sample(&self, _m: &Prepared, _wo: Vec3, _u: [f32; 2], _uc: f32) -> Option<BsdfSample> {
-        None
+    fn prepare(&self, vertex: &Vertex, out: &mut Prepared) {
+        self.body.prepare(vertex, out);
     }
 
-    fn albedo(&self, _m: &Prepared, _wo: Vec3) -> Rgb {
-        Rgb::BLACK
+    fn eval(&self, m: &Prepared, wo: Vec3, wi: Vec3) -> BsdfEval {
+        self.body.eval(m, wo, wi)
+    }
+
+    fn sample(&self, m: &Prepared, wo: Vec3, u: [f32; 2], uc: f32) -> Option<BsdfSample> {
+        self.body.sample(m, wo, u, uc)
+    }
+
+    fn albedo(&self, m: &Prepared, wo: Vec3) -> Rgb {
+        self.body.albedo(m, wo)
     }
 
     fn is_black(&self) -> bool {
-        true
+        self.body.is_black()
     }
 
     fn emission(&self, _uv: Vec2, cos_o: f32) -> Rgb {
