@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::accel::brute::Brute;
-use crate::accel::tests::world::{World, bumpy_sphere, leaf, nested_world, one_group};
+use crate::accel::tests::world::{Balls, World, bumpy_sphere, leaf, nested_world, one_group};
+use crate::base::mesh::TriangleMesh;
 use crate::testing::TestRng;
 use glam::{DAffine3, DVec3, Vec3};
 
@@ -102,6 +103,75 @@ fn memory_is_that_of_the_tree() {
 #[test]
 fn groups_beyond_all_coordinates_are_refused() {
     let mut world = World::default();
-    world.group(vec![leaf(crate::accel::tests::world::Balls(vec![(DVec3::ZERO, 1e16)]))], &[]);
+    world.group(vec![leaf(Balls(vec![(DVec3::ZERO, 1e16)]))], &[]);
     assert!(Kernel::new(world.geometry(), &KernelOptions::default()).is_err());
+}
+
+/// Geometry, placements and rays of any magnitude: an assertion of Embree's would end the test process, and a loop
+/// without end would hang it. What is found must be finite.
+#[test]
+fn any_magnitude_is_survived() {
+    let mut rng = TestRng::new(9);
+    let mut found = 0;
+    for round in 0..300u32 {
+        let tame = round.is_multiple_of(3);
+        let mut power = |low: f64, high: f64| {
+            let e = low + (high - low) * rng.f64();
+            10f64.powf(if tame { e * 0.05 } else { e })
+        };
+        let size = power(-30.0, 14.0);
+        let mut mesh = bumpy_sphere(5);
+        let positions = mesh.0.positions().iter().map(|p| p.map(|x| (f64::from(x) * size) as f32)).collect();
+        mesh.0 = TriangleMesh::new(positions, mesh.0.indices);
+        let mut world = World::default();
+        let ball = Balls(vec![(DVec3::X * size, size * power(-3.0, 0.0))]);
+        let mut group = world.group(vec![leaf(mesh), leaf(ball)], &[]);
+        for _ in 0..3 {
+            let mut placed = || {
+                let scale = DVec3::new(power(-20.0, 20.0), power(-20.0, 20.0), -power(-20.0, 20.0));
+                let turn = DAffine3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), power(-3.0, 1.0));
+                let by = DAffine3::from_translation(DVec3::new(power(-20.0, 14.0), 0.0, -power(-20.0, 14.0)));
+                (group, by * turn * DAffine3::from_scale(scale))
+            };
+            let children = [placed(), placed()];
+            group = world.group(vec![], &children);
+        }
+        let options = KernelOptions {
+            mode: [KernelMode::Robust, KernelMode::Fast][round as usize % 2],
+            ..Default::default()
+        };
+        // Groups larger than coordinates may be are refused.
+        let Ok(kernel) = Kernel::with_budget(world.geometry(), &options, [0, 3, 1000][round as usize % 3])
+        else {
+            continue;
+        };
+        let mut batch = RayBatch::default();
+        for i in 0..60 {
+            let length = power(-18.0, 18.0) as f32;
+            let (o, far) = (power(-20.0, 15.0) as f32, power(-20.0, 38.0) as f32);
+            let o = rng_direction(i) * o;
+            let d = (Vec3::splat(power(-20.0, 14.0) as f32) * rng_direction(i + 7) - o).normalize_or(Vec3::X)
+                * length;
+            batch.push(&Ray { o, d, tnear: far * 1e-3, tfar: far, key: i });
+        }
+        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+            let (mut hits, mut blocked) = (HitBatch::default(), Vec::new());
+            kernel.intersect_batch(&batch, &mut hits, coherence);
+            kernel.occluded_batch(&batch, &mut blocked, coherence);
+            for i in 0..batch.len() {
+                let single = kernel.intersect(&batch.get(i));
+                kernel.occluded(&batch.get(i));
+                for hit in [single, hits.get(i)].into_iter().flatten() {
+                    assert!(hit.t.is_finite() && hit.path < kernel.geometry.root().paths, "{hit:?}");
+                    found += 1;
+                }
+            }
+        }
+        kernel.take_failure().expect("no failure");
+    }
+    assert!(found > 100, "some of it must be hit: {found}");
+}
+
+fn rng_direction(i: u32) -> Vec3 {
+    TestRng::new(u64::from(i)).direction()
 }
