@@ -2,6 +2,7 @@
 
 mod cuboid;
 pub mod ellipsoid;
+pub mod generated;
 pub mod mesh;
 pub mod quadric;
 mod rectangle;
@@ -11,8 +12,16 @@ use crate::base::registry::Row;
 use crate::base::shape::ShapeSource;
 
 /// Every kind of shape.
-pub static REGISTRY: &[Row<dyn ShapeSource>] =
-    &[mesh::ROW, sphere::ROW, ellipsoid::ROW, cuboid::ROW, rectangle::ROW];
+pub static REGISTRY: &[Row<dyn ShapeSource>] = &[
+    mesh::ROW,
+    sphere::ROW,
+    ellipsoid::ROW,
+    cuboid::ROW,
+    rectangle::ROW,
+    generated::DISPLACED_SPHERE,
+    generated::KNOT,
+    generated::TERRAIN,
+];
 
 #[cfg(test)]
 mod tests;
