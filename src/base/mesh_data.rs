@@ -60,7 +60,7 @@ pub struct Repairs {
     pub not_surface: u64,
     /// Normals that were absent at some vertices only, not finite or zero, and are now computed from the faces.
     pub bad_normals: u64,
-    /// Attributes with the wrong count or absent where other faces have them: left out, or zero (uvs).
+    /// Corners and records whose attributes are absent, too many or refer to nothing: left out, or zero (uvs).
     pub bad_attributes: u64,
 }
 
@@ -164,7 +164,7 @@ impl Repairs {
             (self.bad_faces, "faces with fewer than three corners left out"),
             (self.not_surface, "points, lines and other elements that are no surface left out"),
             (self.bad_normals, "missing, zero or non-finite normals computed from the faces"),
-            (self.bad_attributes, "incomplete attributes replaced by zero or left out"),
+            (self.bad_attributes, "absent or surplus attributes replaced by zero or left out"),
         ];
         let said: Vec<String> =
             entries.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();

@@ -1,6 +1,7 @@
 //! L4: files to plain scene data, one file a format.
 
 pub mod families;
+pub mod obj;
 pub mod ply;
 pub mod source;
 mod triangulate;
@@ -15,7 +16,8 @@ struct MeshFormat {
     parse: fn(&Path, &[u8]) -> Result<MeshData>,
 }
 
-const MESH_FORMATS: &[MeshFormat] = &[MeshFormat { extension: "ply", parse: ply::parse }];
+const MESH_FORMATS: &[MeshFormat] =
+    &[MeshFormat { extension: "obj", parse: obj::parse }, MeshFormat { extension: "ply", parse: ply::parse }];
 
 /// The extensions of mesh files that [`load_mesh`] reads, without those of packing.
 pub fn mesh_extensions() -> impl Iterator<Item = &'static str> {
@@ -47,3 +49,6 @@ pub fn load_mesh(path: &Path) -> Result<MeshData> {
     }
     Ok(mesh)
 }
+
+#[cfg(test)]
+mod tests;

@@ -12,6 +12,7 @@ mod faces;
 mod general;
 mod header;
 mod wedges;
+mod words;
 mod write;
 
 pub use write::{write_ply, write_ply_to};
@@ -64,6 +65,8 @@ struct Tables {
     uvs: Vec<[f32; 2]>,
     faces: Faces,
     wedges: Option<Wedges>,
+    /// Lines of text with more in them than the header declares.
+    odd_lines: u64,
 }
 
 impl Tables {
@@ -78,6 +81,7 @@ impl Tables {
             uvs: Vec::new(),
             faces: Faces::new(if has_wedges { u32::MAX } else { plan.vertices }, count),
             wedges: has_wedges.then(|| Wedges::new(plan.vertices)),
+            odd_lines: 0,
         }
     }
 }
@@ -165,7 +169,8 @@ fn assemble(plan: &Plan, tables: Tables) -> Result<MeshData> {
     let edges = plan.elements.iter().filter(|(e, _)| e.name == "edge" && !e.properties.is_empty());
     let edges = edges.map(|(e, _)| e.count as u64).sum();
     let mut repairs = Repairs { not_surface: edges, ..Repairs::default() };
-    let Tables { mut positions, mut normals, mut uvs, faces, wedges } = tables;
+    let Tables { mut positions, mut normals, mut uvs, faces, wedges, odd_lines } = tables;
+    repairs.bad_attributes += odd_lines;
     if let Some(wedges) = wedges {
         repairs.bad_attributes += wedges.bad_lists();
         wedges.split_vertices(&mut positions, &mut normals, &mut uvs);

@@ -1,15 +1,16 @@
 //! The body of an ascii PLY. Files with one record a line, as all writers make them, are read in parallel; what
 //! that reader does not like goes to the general one, which splits at blanks only and gives each error its line.
+//! What even that cannot make sense of is tried once more with the rest of each line passed over: some writers put
+//! more into a line than they declare.
 
 use super::faces::Faces;
-use super::general::{Values, read_element};
-use super::header::{Element, Kind, Scalar};
+use super::header::{Element, Kind};
+use super::words::read_words;
 use super::{Columns, Plan, Role, Tables, is_far_away};
 use crate::base::mesh_data::Positions;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use fast_float2::FastFloat;
 use rayon::prelude::*;
-use std::path::Path;
 
 /// Lines that one task reads.
 const PIECE: usize = 1 << 14;
@@ -18,73 +19,17 @@ const BLOCK: usize = 1 << 16;
 
 /// Reads all elements.
 pub fn read(plan: &Plan) -> Result<Tables> {
-    match read_lines(plan) {
-        Some(tables) => Ok(tables),
-        None => read_words(plan),
+    if let Some(tables) = read_lines(plan) {
+        return Ok(tables);
     }
-}
-
-fn read_words(plan: &Plan) -> Result<Tables> {
-    let mut tables = Tables::new(plan);
-    let mut words = Words { path: plan.path, bytes: plan.bytes, at: plan.body, last: plan.body };
-    for (element, role) in &plan.elements {
-        read_element(plan, element, *role, &mut words, &mut tables)?;
+    let by_words = read_words(plan, false);
+    // Words left over mean that some line held more than was declared, unless reading by lines finds the same.
+    if matches!(by_words, Ok((_, true))) {
+        return by_words.map(|(tables, _)| tables);
     }
-    Ok(tables)
-}
-
-/// The words of a text.
-struct Words<'a> {
-    path: &'a Path,
-    bytes: &'a [u8],
-    /// Behind the word read last, and its start.
-    at: usize,
-    last: usize,
-}
-
-impl Values for Words<'_> {
-    fn number(&mut self, _kind: Scalar) -> Result<f64, String> {
-        let rest = &self.bytes[self.at..];
-        self.last = self.at + rest.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(rest.len());
-        let rest = &self.bytes[self.last..];
-        let word = &rest[..rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len())];
-        self.at = self.last + word.len();
-        if word.is_empty() {
-            return Err("the file is cut short here".to_string());
-        }
-        parse_number(word).ok_or_else(|| {
-            let shown = &word[..word.len().min(40)];
-            format!("\"{}\" is no number", String::from_utf8_lossy(shown).escape_debug())
-        })
-    }
-
-    fn can_hold(&self, count: usize, _kind: Scalar) -> bool {
-        // Each number takes a blank and a digit.
-        count <= (self.bytes.len() - self.at) / 2
-    }
-
-    fn fail(&self, message: String) -> Error {
-        let line = 1 + self.bytes[..self.last].iter().filter(|&&b| b == b'\n').count();
-        Error::content_at(self.path, line, 0, message)
-    }
-}
-
-/// A number, also as the C runtime of Windows writes those that are none: `-nan(ind)`, `1.#INF`, `-1.#IND`.
-fn parse_number(word: &[u8]) -> Option<f64> {
-    if let Ok(value) = fast_float2::parse(word) {
-        return Some(value);
-    }
-    let lower = word.to_ascii_lowercase();
-    let (sign, rest) = match lower.strip_prefix(b"-") {
-        Some(rest) => (-1.0, rest),
-        None => (1.0, lower.strip_prefix(b"+").unwrap_or(&lower)),
-    };
-    if rest.starts_with(b"1.#inf") {
-        Some(sign * f64::INFINITY)
-    } else if rest.starts_with(b"1.#") || rest.starts_with(b"nan(") {
-        Some(f64::NAN)
-    } else {
-        None
+    match read_words(plan, true) {
+        Ok((tables, _)) => Ok(tables),
+        Err(_) => by_words.map(|(tables, _)| tables),
     }
 }
 

@@ -9,6 +9,8 @@ use crate::error::{Error, Result};
 pub trait Values {
     /// The next number. The error completes "vertex 3 of 8: ...".
     fn number(&mut self, kind: Scalar) -> Result<f64, String>;
+    /// Tells that a new record starts.
+    fn start_record(&mut self) {}
     /// Whether so many numbers of this type can still follow.
     fn can_hold(&self, count: usize, kind: Scalar) -> bool;
     /// An error at the place of the number read last.
@@ -93,6 +95,7 @@ impl<V: Values> Records<'_, V> {
     }
 
     fn read(&mut self, wanted: [Option<usize>; 2]) -> Result<(), String> {
+        self.values.start_record();
         for list in &mut self.lists {
             list.clear();
         }

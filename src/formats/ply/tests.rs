@@ -201,6 +201,23 @@ fn corners_with_different_texture_coordinates_are_split() {
 }
 
 #[test]
+fn lines_may_hold_more_than_is_declared() {
+    // As in a file by MeshLab, which declares four colours a face and writes nine.
+    let text = square(3, "3 0 1 2 9 8 7\n4 0 1 2 3 9 8 7\n3 1 2 3\n");
+    let mesh = read(&text).unwrap();
+    assert_eq!(mesh.indices, [[0, 1, 2], [0, 1, 2], [0, 2, 3], [1, 2, 3]]);
+    assert_eq!(mesh.repairs.bad_attributes, 2);
+    // Words behind the last record are nothing to us.
+    assert_eq!(read(square(1, "3 0 1 2\n\n") + "and so on\n").unwrap().indices, [[0, 1, 2]]);
+    assert_eq!(
+        read(square(1, "3 0 1 2\n\n").replace('\n', "\n\n").replace("\n\nend", "\nend") + "x")
+            .unwrap()
+            .indices,
+        [[0, 1, 2]]
+    );
+}
+
+#[test]
 fn long_files_read_alike_in_pieces_and_word_by_word() {
     // More lines than several pieces hold, a face of four corners now and then, and colours to skip.
     let count = 50_000;
