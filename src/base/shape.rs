@@ -177,6 +177,18 @@ pub trait ShapeSource: Send + Sync {
     /// Encloses everything that can be placed; empty if there is nothing.
     fn bounds(&self) -> DAabb;
 
+    /// For each direction the largest p . d of any point of the shape: where a plane that moves in against `d` first
+    /// touches it. No more than what [`ShapeSource::bounds`] says, which the default goes by; minus infinity if there
+    /// is nothing. Frames a shape more closely than its bounds can.
+    fn support(&self, directions: &[DVec3]) -> Vec<f64> {
+        let corners = self.bounds();
+        if corners.is_empty() {
+            return vec![f64::NEG_INFINITY; directions.len()];
+        }
+        let corners = corners.corners();
+        directions.iter().map(|d| corners.iter().fold(f64::NEG_INFINITY, |a, c| a.max(c.dot(*d)))).collect()
+    }
+
     /// The shape after the affine map `to_group`, which includes recentring and scale: the one step from double to
     /// single precision, and the one place where it is decided which primitives are valid. Consumes the source so
     /// that large arrays can be moved where nobody else holds them. Errors where the map cannot be inverted.

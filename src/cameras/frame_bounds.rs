@@ -54,6 +54,13 @@ const MARGIN: f64 = 0.05;
 /// A perspective camera that sees all eight corners of `bounds` (of the unit box, if they are empty) in the middle
 /// of the film and as large as fits, but for a small margin.
 pub fn frame_bounds(bounds: &DAabb, view: &View, film: FilmSize) -> Node {
+    frame(bounds, &|_| Vec::new(), view, film)
+}
+
+/// As [`frame_bounds`], for the thing itself rather than its bounds: `support` gives for each direction the largest
+/// p . d of its points (see [`crate::base::shape::ShapeSource::support`]). What is not a finite number is taken from
+/// the bounds.
+pub fn frame(bounds: &DAabb, support: &dyn Fn(&[DVec3]) -> Vec<f64>, view: &View, film: FilmSize) -> Node {
     let unit = DAabb::new(DVec3::splat(-0.5), DVec3::splat(0.5));
     let bounds = if bounds.is_finite() { bounds } else { &unit };
     let center = bounds.center();
@@ -61,10 +68,26 @@ pub fn frame_bounds(bounds: &DAabb, view: &View, film: FilmSize) -> Node {
     let forward = -to_eye;
     let right = forward.cross(up).normalize();
     let upright = right.cross(forward);
-    let corners = bounds.corners().map(|c| c - center);
     let tan = (0.5 * view.fov_deg).to_radians().tan() * (1.0 - 2.0 * MARGIN);
-    let across = fit(&corners, right, forward, tan * film.aspect());
-    let along = fit(&corners, upright, forward, tan);
+    let (tan_x, tan_y) = (tan * film.aspect(), tan);
+    // The frustum's planes: right and left, top and bottom.
+    let planes = [
+        right - forward * tan_x,
+        -right - forward * tan_x,
+        upright - forward * tan_y,
+        -upright - forward * tan_y,
+    ];
+    let exact = support(&planes);
+    let corners = bounds.corners();
+    let reach: [f64; 4] = std::array::from_fn(|k| {
+        let by_bounds = corners.iter().fold(f64::NEG_INFINITY, |a, c| a.max((*c - center).dot(planes[k])));
+        match exact.get(k) {
+            Some(r) if r.is_finite() => (r - center.dot(planes[k])).min(by_bounds),
+            _ => by_bounds,
+        }
+    });
+    let across = fit(reach[0], reach[1], tan_x);
+    let along = fit(reach[2], reach[3], tan_y);
     // A thing without extent is seen from one unit; any other from outside of the sphere around it.
     let radius = bounds.radius();
     let least = if radius > 0.0 { 1.02 * radius } else { 1.0 };
@@ -86,13 +109,7 @@ struct Fit {
 }
 
 /// The frustum's two planes of one axis, pushed against the points: the eye (s, f) must have |c_s - s| <=
-/// tan (c_f - f) for each point (c_s, c_f).
-fn fit(points: &[DVec3], side: DVec3, forward: DVec3, tan: f64) -> Fit {
-    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    for p in points {
-        let (s, f) = (p.dot(side), p.dot(forward) * tan);
-        high = high.max(s - f);
-        low = low.min(s + f);
-    }
-    Fit { depth: (low - high) / (2.0 * tan), offset: (low + high) * 0.5 }
+/// tan (c_f - f) for each point (c_s, c_f). `high` and `low` are the largest c_s - tan c_f and -c_s - tan c_f.
+fn fit(high: f64, low: f64, tan: f64) -> Fit {
+    Fit { depth: (-low - high) / (2.0 * tan), offset: (high - low) * 0.5 }
 }

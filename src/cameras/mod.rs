@@ -3,7 +3,7 @@
 mod frame_bounds;
 pub mod perspective;
 
-pub use frame_bounds::{UpAxis, View, frame_bounds};
+pub use frame_bounds::{UpAxis, View, frame, frame_bounds};
 
 use crate::base::camera::CameraSource;
 use crate::base::registry::Row;

@@ -169,3 +169,14 @@ fn framed_bounds_fill_the_picture_but_for_the_margin() {
         assert!(build("camera", REGISTRY, &node).is_ok());
     }
 }
+
+#[test]
+fn a_ball_is_framed_by_itself_and_not_by_its_box() {
+    let b = DAabb::new(DVec3::splat(-1.0), DVec3::splat(1.0));
+    let node = super::frame(&b, &|d| d.iter().map(|d| d.length()).collect(), &View::default(), FILM);
+    let at = |name: &str| DVec3::from_array(node.params.vector(name).expect("given"));
+    // In the middle, and its outline, at the sine of its distance, five percent from the borders above and below.
+    assert!(at("look_at").length() < 1e-12);
+    let tan = 0.9 * 17.5f64.to_radians().tan();
+    assert!((1.0 / at("eye").length() - tan.atan().sin()).abs() < 1e-12);
+}

@@ -52,7 +52,7 @@ pub fn build(mut desc: SceneDesc, options: &BuildOptions) -> Result<Scene> {
     let sources = build_sources(&mut desc)?;
     let plan = plan_groups(&desc, sources)?;
     let space = plan.render_space();
-    let camera = build_camera(&desc, &plan.world_bounds(), &space)?;
+    let camera = build_camera(&desc, &plan, &space)?;
     let mut objects = ObjectTable { named: &named, objects: Vec::new() };
     let mut report = BuildReport { groups: plan.groups.len(), ..BuildReport::default() };
     let geometry = Arc::new(place_groups(plan, &mut objects, &mut report)?);
@@ -84,14 +84,14 @@ pub fn build(mut desc: SceneDesc, options: &BuildOptions) -> Result<Scene> {
     })
 }
 
-fn build_camera(desc: &SceneDesc, bounds: &DAabb, space: &RenderSpace) -> Result<Arc<dyn Camera>> {
+fn build_camera(desc: &SceneDesc, plan: &GroupPlan, space: &RenderSpace) -> Result<Arc<dyn Camera>> {
     let [width, height] = desc.film.size;
     let film = FilmSize { width, height };
     let framed;
     let node = match &desc.camera {
         Some(node) => node,
         None => {
-            framed = cameras::frame_bounds(bounds, &desc.view, film);
+            framed = cameras::frame(&plan.world_bounds(), &|d| plan.support(d), &desc.view, film);
             &framed
         }
     };

@@ -64,6 +64,27 @@ impl GroupPlan<'_> {
         self.groups.last().map_or(DAabb::EMPTY, |g| g.bounds)
     }
 
+    /// For each direction the largest p . d of anything, in world space; that of placed groups by their bounds.
+    pub fn support(&self, directions: &[DVec3]) -> Vec<f64> {
+        let mut most = vec![f64::NEG_INFINITY; directions.len()];
+        let Some(root) = self.groups.last() else { return most };
+        let mut take = |support: Vec<f64>| most.iter_mut().zip(support).for_each(|(m, s)| *m = m.max(s));
+        for s in &root.shapes {
+            let local: Vec<DVec3> = directions.iter().map(|d| s.transform.matrix3.transpose() * *d).collect();
+            let offsets = directions.iter().map(|d| s.transform.translation.dot(*d));
+            take(s.source.support(&local).into_iter().zip(offsets).map(|(s, o)| s + o).collect());
+        }
+        for c in &root.children {
+            let bounds = self.groups[c.group].bounds.transformed(&c.transform);
+            if !bounds.is_empty() {
+                let corners = bounds.corners();
+                let reach = |d: &DVec3| corners.iter().fold(f64::NEG_INFINITY, |a, c| a.max(c.dot(*d)));
+                take(directions.iter().map(reach).collect());
+            }
+        }
+        most
+    }
+
     /// World to render space: the root group's own recentring.
     pub fn render_space(&self) -> RenderSpace {
         let to_local = self.groups.last().map_or(DAffine3::IDENTITY, |g| g.to_local);

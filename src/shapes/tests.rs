@@ -228,3 +228,31 @@ fn transforms_that_flatten_are_errors() {
         assert!(!source.describe().is_empty() && shape.memory() > 0 && !shape.describe().is_empty());
     }
 }
+
+#[test]
+fn support_touches_what_can_be_hit() {
+    let mut rng = TestRng::new(9);
+    for Built { label, it } in sources() {
+        let directions: Vec<DVec3> = (0..4).map(|_| rng.direction().as_dvec3() * 3.0).collect();
+        let support = it.support(&directions);
+        let (bounds, center) = (it.bounds(), it.bounds().center());
+        let shape = it.place(&DAffine3::from_translation(-center)).expect("places").shape;
+        let size = bounds.size().length();
+        for (d, s) in directions.iter().zip(support) {
+            let by_bounds = bounds.corners().iter().map(|c| c.dot(*d)).fold(f64::NEG_INFINITY, f64::max);
+            assert!(s <= by_bounds + 1e-9 * size, "{label}");
+            // The furthest of many points hit comes close to it and never beyond.
+            let mut furthest = f64::NEG_INFINITY;
+            for _ in 0..300 {
+                let ray = ray_at(&mut rng, &shape.bounds());
+                if let Some((prim, t)) = closest(&*shape, &ray) {
+                    let p = shape.refine(&ray, prim, t as f32, Needs::default()).p + center;
+                    furthest = furthest.max(p.dot(*d));
+                }
+            }
+            // f32 rounding of corners, three lengths of d.
+            assert!(furthest < s + 1e-6 * size, "{label}: {furthest} {s}");
+            assert!(furthest > s - 1.2 * size, "{label}: {furthest} {s}");
+        }
+    }
+}

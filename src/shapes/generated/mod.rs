@@ -71,6 +71,10 @@ impl ShapeSource for Generated {
         self.mesh.get_or_init(|| self.made()).bounds()
     }
 
+    fn support(&self, directions: &[DVec3]) -> Vec<f64> {
+        self.mesh.get_or_init(|| self.made()).support(directions)
+    }
+
     fn place(self: Arc<Self>, to_group: &DAffine3) -> Result<Placed> {
         let mesh = match Arc::try_unwrap(self) {
             Ok(mut own) => own.mesh.take().unwrap_or_else(|| own.made()),

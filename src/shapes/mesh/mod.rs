@@ -13,7 +13,7 @@ use crate::base::registry::{ParamKind, ParamSpec, Params, Row};
 use crate::base::shape::{Placed, ShapeSource};
 use crate::error::Result;
 use crate::math::aabb::DAabb;
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 use std::sync::{Arc, OnceLock};
 
 /// The registry row.
@@ -69,6 +69,10 @@ impl MeshSource {
 impl ShapeSource for MeshSource {
     fn bounds(&self) -> DAabb {
         *self.bounds.get_or_init(|| place::bounds(&self.data))
+    }
+
+    fn support(&self, directions: &[DVec3]) -> Vec<f64> {
+        place::support(&self.data, directions)
     }
 
     fn place(self: Arc<Self>, to_group: &DAffine3) -> Result<Placed> {

@@ -53,20 +53,41 @@ impl Parts {
     }
 }
 
+/// Calls `f` with every corner of the triangles whose corners are finite.
+fn for_each_corner(data: &MeshData, triangles: &[[u32; 3]], mut f: impl FnMut(DVec3)) {
+    let count = data.positions.len();
+    for t in triangles.iter().filter(|t| t.iter().all(|&i| (i as usize) < count)) {
+        let c = t.map(|i| data.positions.get(i as usize));
+        if c.iter().all(|p| p.is_finite()) {
+            c.into_iter().for_each(&mut f);
+        }
+    }
+}
+
 /// Encloses the triangles whose corners are finite; vertices that no such triangle uses do not count.
 pub fn bounds(data: &MeshData) -> DAabb {
-    let count = data.positions.len();
     let of = |triangles: &[[u32; 3]]| {
         let mut b = DAabb::EMPTY;
-        for t in triangles.iter().filter(|t| t.iter().all(|&i| (i as usize) < count)) {
-            let c = t.map(|i| data.positions.get(i as usize));
-            if c.iter().all(|p| p.is_finite()) {
-                c.into_iter().for_each(|p| b.extend(p));
-            }
-        }
+        for_each_corner(data, triangles, |p| b.extend(p));
         b
     };
     data.indices.par_chunks(GRAIN).map(of).reduce(|| DAabb::EMPTY, |a, b| a.union(b))
+}
+
+/// The largest p . d of the same triangles for each direction.
+pub fn support(data: &MeshData, directions: &[DVec3]) -> Vec<f64> {
+    let none = || vec![f64::NEG_INFINITY; directions.len()];
+    let of = |triangles: &[[u32; 3]]| {
+        let mut most = none();
+        for_each_corner(data, triangles, |p| {
+            for (m, d) in most.iter_mut().zip(directions) {
+                *m = m.max(p.dot(*d));
+            }
+        });
+        most
+    };
+    let larger = |a: Vec<f64>, b: Vec<f64>| a.into_iter().zip(b).map(|(a, b)| a.max(b)).collect();
+    data.indices.par_chunks(GRAIN).map(of).reduce(none, larger)
 }
 
 /// Carries a mesh into its group and drops what is no triangle there.

@@ -32,6 +32,11 @@ impl ShapeSource for QuadricSource {
         bounds(&self.to_object)
     }
 
+    fn support(&self, directions: &[DVec3]) -> Vec<f64> {
+        let m = &self.to_object;
+        directions.iter().map(|d| m.translation.dot(*d) + (m.matrix3.transpose() * *d).length()).collect()
+    }
+
     fn place(self: Arc<Self>, to_group: &DAffine3) -> Result<Placed> {
         let shape = Arc::new(Quadric::new(*to_group * self.to_object)?);
         Ok(Placed { shape, dropped: Dropped::default() })
