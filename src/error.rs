@@ -10,7 +10,7 @@ pub enum Error {
     #[error("{0}")]
     Usage(String),
     /// A file was read, but what stands in it cannot be used. Exit code 2.
-    #[error("{place}: {message}")]
+    #[error("{}{message}", place.prefix())]
     Content {
         /// Where it stands.
         place: Place,
@@ -44,6 +44,13 @@ pub struct Place {
     pub line: usize,
     /// Column in characters, from 1; 0 as above.
     pub column: usize,
+}
+
+impl Place {
+    /// `scene.toml:14:3: `, or nothing if no file is known: scenes are made in code, too.
+    fn prefix(&self) -> String {
+        if self.path.as_os_str().is_empty() { String::new() } else { format!("{self}: ") }
+    }
 }
 
 impl fmt::Display for Place {

@@ -1,18 +1,29 @@
-//! Ctrl-C: at once.
+//! Ctrl-C: at once, but never in the middle of a file.
 
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 use signal_hook::low_level;
+use std::sync::{Mutex, PoisonError};
+
+/// Held while files are written.
+static WRITING: Mutex<()> = Mutex::new(());
 
 /// Ends the process at the first SIGINT or SIGTERM with 128 plus the signal's number (130 for Ctrl-C), as shells do.
-///  No destructors run: those of native libraries must not, under worker
+/// Files being written are finished first. No destructors run: those of native libraries must not, under worker
 /// threads that still trace.
 pub fn listen() {
     let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else { return };
     std::thread::spawn(move || {
         if let Some(signal) = signals.forever().next() {
+            let _writing = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
             eprintln!("\nskylit: interrupted");
             low_level::exit(128 + signal);
         }
     });
+}
+
+/// Writes files without being interrupted.
+pub fn hold_off<T>(write: impl FnOnce() -> T) -> T {
+    let _writing = WRITING.lock().unwrap_or_else(PoisonError::into_inner);
+    write()
 }

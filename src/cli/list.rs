@@ -1,9 +1,12 @@
 //! `skylit list`: every registered kind with its parameters, derived from the registry tables.
 
 use super::print;
+use crate::accel;
 use crate::base::registry::ParamSpec;
 use crate::error::{Error, Result, unknown_name};
 use crate::formats::families::{Families, Family, describe};
+use crate::image::tonemap::ToneMap;
+use crate::render::{aov, film_layers};
 use clap::Args;
 use std::fmt::Write;
 
@@ -16,7 +19,7 @@ pub struct ListArgs {
 
 /// Runs the verb.
 pub fn run(args: &ListArgs) -> Result<()> {
-    let families = Families::registered().all();
+    let families = families();
     let chosen: Vec<Family> = match &args.family {
         None => families,
         Some(name) => {
@@ -33,6 +36,17 @@ pub fn run(args: &ListArgs) -> Result<()> {
     };
     let sections: Vec<String> = chosen.iter().map(section).collect();
     print(sections.join("\n").as_bytes())
+}
+
+/// The families of scene files, and those that the command line alone names.
+fn families() -> Vec<Family> {
+    let aovs = aov::REGISTRY.iter().map(|r| (r.name, r.doc));
+    let film_layers = film_layers::REGISTRY.iter().map(|f| (f.name, f.doc));
+    let mut all = Families::registered().all();
+    all.push(Family::of_names("aov", aovs.chain(film_layers)));
+    all.push(Family::of_names("backend", accel::KERNELS.iter().map(|k| (k.name, k.doc))));
+    all.push(Family::of_names("tonemap", ToneMap::ALL.map(|t| (t.name(), t.doc()))));
+    all
 }
 
 /// Of the families' names: "skies", "materials".

@@ -1,9 +1,16 @@
 //! L5: the command line, one file a verb. Results go to stdout, progress and logs to stderr.
 
 mod args;
+mod info;
 mod interrupt;
 mod list;
 mod manual;
+mod output;
+mod progress;
+mod render;
+mod scene_args;
+mod sky_arg;
+mod summary;
 
 use crate::error::{Error, Result};
 use args::Threads;
@@ -18,6 +25,7 @@ use std::sync::Mutex;
 /// Renders large triangle meshes and quadrics under skies, fast and accurately, on the CPU.
 #[derive(Parser)]
 #[command(name = "skylit", version = VERSION, long_version = LONG_VERSION, arg_required_else_help = true)]
+#[command(after_help = "A mesh alone is a scene: skylit render dragon.ply -o dragon.png")]
 struct Cli {
     #[command(subcommand)]
     verb: Verb,
@@ -54,6 +62,10 @@ struct Common {
 
 #[derive(Subcommand)]
 enum Verb {
+    /// Render a scene or a mesh to pictures
+    Render(Box<render::RenderArgs>),
+    /// Say what is in a scene or a mesh, what it needs and what it will cost
+    Info(Box<info::InfoArgs>),
     /// List every registered kind with its parameters
     List(list::ListArgs),
     /// Print the completions of a shell
@@ -91,12 +103,21 @@ fn run() -> Result<(), Failure> {
     let threads = cli.common.threads.unwrap_or(Threads::Max).count();
     let started = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
     started.map_err(|e| Error::Internal(format!("cannot start {threads} threads: {e}")))?;
+    let setting = Setting { threads, quiet: cli.common.quiet };
     match &cli.verb {
+        Verb::Render(args) => render::run(args, &setting)?,
+        Verb::Info(args) => info::run(args, &setting)?,
         Verb::List(args) => list::run(args)?,
         Verb::Completions(args) => manual::completions(args)?,
         Verb::Man(args) => manual::man(args)?,
     }
     Ok(())
+}
+
+/// What the flags of every verb come to.
+struct Setting {
+    threads: usize,
+    quiet: bool,
 }
 
 fn start_log(common: &Common) {

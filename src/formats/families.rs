@@ -2,9 +2,11 @@
 
 use crate::base::registry::{ParamKind, ParamSpec, Row};
 use crate::error::unknown_name;
+use crate::lights::sky::SkySampling;
 use crate::sampler::Sampler;
 use crate::sampling::filter::PixelFilter;
-use crate::{cameras, lights, materials, shapes, skyboxes, textures};
+use crate::skyboxes::presets;
+use crate::{cameras, integrators, lights, materials, shapes, skyboxes, textures};
 
 /// A registered kind: its name and what it takes.
 #[derive(Debug, Clone, Copy)]
@@ -90,12 +92,15 @@ impl Families {
             materials: Family::of("material", materials::REGISTRY),
             textures: Family::of("texture", textures::REGISTRY),
             lights: Family::of("light", lights::REGISTRY),
-            skies: Family::of("sky", skyboxes::REGISTRY),
+            skies: skies(),
             cameras: Family::of("camera", cameras::REGISTRY),
-            integrators: Family { name: "integrator", kinds: vec![] },
+            integrators: Family::of("integrator", integrators::REGISTRY),
             samplers: Family::of_names("sampler", Sampler::NAMES.map(|(name, s)| (name, s.doc()))),
             filters: Family::of_names("filter", PixelFilter::NAMES.map(|(name, f)| (name, f.doc()))),
-            sky_sampling: Family { name: "sky sampling", kinds: vec![] },
+            sky_sampling: Family::of_names(
+                "sky sampling",
+                SkySampling::NAMES.map(|(name, s)| (name, s.doc())),
+            ),
         }
     }
 
@@ -116,6 +121,16 @@ impl Families {
         all.retain(|f| !f.kinds.is_empty());
         all
     }
+}
+
+/// Skies: the registered kinds, then the presets, each of which takes the parameters of the kind it is made of.
+fn skies() -> Family {
+    let mut family = Family::of("sky", skyboxes::REGISTRY);
+    for (name, doc) in presets::names() {
+        let kind = presets::preset(name).and_then(|node| family.find(&node.kind).copied());
+        family.kinds.extend(kind.map(|k| Kind { name, doc, params: k.params }));
+    }
+    family
 }
 
 /// What a parameter takes, for people: "a number from 0 to 180".

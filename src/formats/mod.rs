@@ -1,13 +1,18 @@
 //! L4: files to plain scene data, one file a format.
 
 pub mod families;
+mod files;
+pub mod mesh_scene;
+pub mod native;
 pub mod obj;
 pub mod ply;
+pub mod sky_files;
 pub mod source;
 mod triangulate;
 
 use crate::base::mesh_data::MeshData;
 use crate::error::{Error, Result, unknown_name};
+use crate::scene::desc::SceneDesc;
 use std::path::Path;
 
 /// One mesh format: the extension that names it, and its reader.
@@ -22,6 +27,26 @@ const MESH_FORMATS: &[MeshFormat] =
 /// The extensions of mesh files that [`load_mesh`] reads, without those of packing.
 pub fn mesh_extensions() -> impl Iterator<Item = &'static str> {
     MESH_FORMATS.iter().map(|format| format.extension)
+}
+
+/// The extension of native scene files.
+const NATIVE: &str = "toml";
+
+/// Loads a scene file, or a mesh alone as a scene; the extension tells which.
+///
+/// # Errors
+/// Those of [`native::load`] and [`mesh_scene::load`]; an unknown extension.
+pub fn load(path: &Path) -> Result<SceneDesc> {
+    if is_mesh_path(path) {
+        return mesh_scene::load(path);
+    }
+    let extension = source::content_extension(path).unwrap_or_default();
+    if extension == NATIVE {
+        return native::load(path);
+    }
+    let what =
+        unknown_name("kind of scene file", &extension, std::iter::once(NATIVE).chain(mesh_extensions()));
+    Err(Error::content(path, what))
 }
 
 /// Whether [`load_mesh`] knows the kind of file that `path` names.

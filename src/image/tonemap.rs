@@ -39,6 +39,16 @@ impl ToneMap {
         }
     }
 
+    /// One line for people.
+    pub const fn doc(self) -> &'static str {
+        match self {
+            ToneMap::None => "cut off at 1",
+            ToneMap::Reinhard => "Reinhard et al. 2002 on luminance; 8 becomes white",
+            ToneMap::AcesFit => "Stephen Hill's fit of the ACES output transform",
+            ToneMap::Agx => "Troy Sobotka's AgX: highlights fade to white",
+        }
+    }
+
     /// Radiance (negative values count as 0) to display-linear values in [0, 1], which the sRGB curve then encodes.
     pub fn apply(self, radiance: Rgb) -> Rgb {
         let c = radiance.map(|v| v.max(0.0));

@@ -37,8 +37,29 @@ const JPEG_QUALITY: u8 = 92;
 /// device or a write-protected file in the place of the picture.
 pub fn check_writable(path: &Path) -> Result<()> {
     format_of(path)?;
+    check_file(path)
+}
+
+/// As [`check_writable`], for a file of any kind.
+///
+/// # Errors
+/// As [`check_writable`], whatever the extension.
+pub fn check_file(path: &Path) -> Result<()> {
     let target = target_of(path)?;
     temporary(path, &target).map(drop)
+}
+
+/// Writes a file of any kind, whole or not at all. A file that stands there is replaced.
+///
+/// # Errors
+/// As [`check_file`]; a disk that is full.
+pub fn write_file(path: &Path, content: &[u8]) -> Result<()> {
+    let target = target_of(path)?;
+    let mut file = temporary(path, &target)?;
+    let fail = |e: io::Error| Error::file(path, "write", e);
+    file.write_all(content).and_then(|()| file.as_file().sync_all()).map_err(fail)?;
+    file.persist(&target).map_err(|e| fail(e.error))?;
+    Ok(())
 }
 
 /// Writes a picture; the extension of `path` says in which format. A file that stands there is replaced.

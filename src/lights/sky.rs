@@ -1,48 +1,61 @@
-//! The one light behind every sky: whatever its charts, it is sampled by a table of exact cell integrals, by
-//! inversion, and its analytic discs by their cones.
+//! The light of a sky, of whatever kind.
+
+mod plan;
 
 use crate::base::light::{Extent, Light, LightSample, PathEnd, Receiver};
 use crate::base::skybox::{ChartGrid, ChartPoint, SkyDisc, Skybox};
 use crate::color::Rgb;
 use crate::error::{Error, Result, unknown_name};
-use crate::math::frame::Frame;
+use crate::math::Frame;
 use crate::sampler::hash::extend_unit;
 use crate::sampling::distribution::ChartDistribution;
-use crate::sampling::warp::{cosine_hemisphere, uniform_cone};
-use glam::{Vec2, Vec3};
+use crate::sampling::warp;
+use glam::{DVec3, Vec2, Vec3};
+use plan::Plan;
 use std::f64::consts::PI;
 use std::str::FromStr;
 use std::sync::Arc;
 
-/// How directions to the sky are sampled.
+/// How directions to the map of a sky are sampled; discs are sampled uniformly within their cones by all methods.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SkySampling {
-    /// By what exceeds the mean: scattering finds the rest, and both are weighted together (Karlik et al. 2019, "MIS
-    /// Compensation: Optimizing Sampling Techniques in Multiple Importance Sampling"). A constant sky leaves nothing.
+    /// By the luminance that rises above the average, where that pays: BSDF sampling finds the rest as well (Karlik et
+    /// al. 2019). Under a constant sky nothing is left and there is no sample.
     #[default]
     Compensated,
-    /// By radiance.
+    /// By luminance.
     Table,
-    /// By the cosine at the receiver, whatever the sky shows.
+    /// By the cosine to the receiver's shading normal.
     Cosine,
 }
 
 impl SkySampling {
-    /// Names as the command line and scene files spell them.
+    /// All methods with their names, as scene files spell them.
     pub const NAMES: [(&'static str, SkySampling); 3] = [
         ("compensated", SkySampling::Compensated),
         ("table", SkySampling::Table),
         ("cosine", SkySampling::Cosine),
     ];
+
+    /// One line about it.
+    pub const fn doc(self) -> &'static str {
+        match self {
+            SkySampling::Compensated => {
+                "by the luminance above the average; the rest is left to BSDF sampling"
+            }
+            SkySampling::Table => "by luminance",
+            SkySampling::Cosine => "by the cosine at the receiver, whatever the sky shows",
+        }
+    }
 }
 
 impl FromStr for SkySampling {
     type Err = Error;
 
     fn from_str(s: &str) -> Result<Self> {
-        let found = Self::NAMES.iter().find(|(name, _)| *name == s);
-        let known = Self::NAMES.iter().map(|(name, _)| *name);
-        found.map(|(_, k)| *k).ok_or_else(|| Error::Usage(unknown_name("sky sampling", s, known)))
+        let known = Self::NAMES.iter().map(|n| n.0);
+        let found = Self::NAMES.iter().find(|n| n.0 == s);
+        found.map(|n| n.1).ok_or_else(|| Error::Usage(unknown_name("sky sampling", s, known)))
     }
 }
 
@@ -51,9 +64,10 @@ impl FromStr for SkySampling {
 pub struct SkyOptions {
     /// Scales its radiance; finite and at least 0.
     pub intensity: f64,
-    /// Turns it about +y, degrees, counter-clockwise seen from above.
+    /// Turns it about +y by the right-hand rule (counter-clockwise seen from above), degrees: 90 brings what was at
+    /// +z to +x.
     pub rotate_y_deg: f64,
-    /// See [`SkySampling`].
+    /// How it is sampled.
     pub sampling: SkySampling,
 }
 
@@ -63,196 +77,312 @@ impl Default for SkyOptions {
     }
 }
 
-/// A sky as a light.
+/// The light of a skybox. Render space has the axes of world space, so directions are the same in both.
 pub struct SkyLight {
-    skybox: Arc<dyn Skybox>,
+    sky: Arc<dyn Skybox>,
     intensity: f32,
-    turn: Turn,
-    sampling: SkySampling,
-    table: Option<Table>,
-    discs: Vec<Disc>,
-    /// Probability that a sample is taken from the discs.
-    disc_share: f64,
-    /// Integral of luminance over the sphere, discs included, before `intensity`.
+    turn: Option<Turn>,
+    discs: Vec<PlacedDisc>,
+    map: MapSampler,
+    /// Probability of sampling the map where all discs are in sight.
+    map_share: f64,
+    /// Integral of luminance over all directions.
     total: f64,
 }
 
-/// Cells and their densities.
-struct Table {
-    cells: ChartDistribution,
-    grid: ChartGrid,
+enum MapSampler {
+    None,
+    Cosine,
+    Table { grid: ChartGrid, cells: ChartDistribution },
 }
 
-/// A disc, in the sky's own axes.
-struct Disc {
-    disc: SkyDisc,
-    frame: Frame,
-    /// 1 - cos of the half angle.
-    height: f32,
-    /// Density within it, given that this disc is chosen.
-    density: f64,
-    /// Upper end of its share of the discs' samples.
-    below: f64,
-    share: f64,
-}
-
-/// A turn about +y.
-#[derive(Clone, Copy)]
+/// A rotation about +y.
+#[derive(Debug, Clone, Copy)]
 struct Turn {
-    sin: f32,
-    cos: f32,
+    sin: f64,
+    cos: f64,
 }
 
 impl Turn {
-    /// From world to the sky's own axes.
-    #[inline]
-    fn to_sky(self, d: Vec3) -> Vec3 {
-        Vec3::new(self.cos * d.x - self.sin * d.z, d.y, self.sin * d.x + self.cos * d.z)
+    /// None for whole turns.
+    fn new(degrees: f64) -> Option<Self> {
+        let d = degrees.rem_euclid(360.0);
+        // Quarter turns are exact.
+        let (sin, cos) = match d {
+            90.0 => (1.0, 0.0),
+            180.0 => (0.0, -1.0),
+            270.0 => (-1.0, 0.0),
+            _ => d.to_radians().sin_cos(),
+        };
+        (d != 0.0).then_some(Turn { sin, cos })
     }
 
-    /// From the sky's own axes to world.
-    #[inline]
-    fn to_world(self, d: Vec3) -> Vec3 {
-        Vec3::new(self.cos * d.x + self.sin * d.z, d.y, self.cos * d.z - self.sin * d.x)
+    #[inline(always)]
+    fn to_world(self, d: DVec3) -> DVec3 {
+        DVec3::new(d.x * self.cos + d.z * self.sin, d.y, d.z * self.cos - d.x * self.sin)
+    }
+
+    #[inline(always)]
+    fn to_sky(self, d: DVec3) -> DVec3 {
+        DVec3::new(d.x * self.cos - d.z * self.sin, d.y, d.z * self.cos + d.x * self.sin)
+    }
+}
+
+/// A disc of the sky in world space.
+struct PlacedDisc {
+    frame: Frame,
+    /// 1 - cos of its half angle.
+    m: f32,
+    /// Sine of its half angle.
+    sin: f32,
+    radiance: Rgb,
+    /// Probability of sampling it where all discs are in sight.
+    share: f64,
+}
+
+impl PlacedDisc {
+    fn new(disc: &SkyDisc, turn: Option<Turn>, intensity: f32, share: f64) -> Self {
+        let toward = turn.map_or(disc.toward, |t| t.to_world(disc.toward));
+        PlacedDisc {
+            frame: Frame::from_z(toward.as_vec3()),
+            m: (2.0 * (0.5 * disc.half_angle).sin().powi(2)) as f32,
+            sin: disc.half_angle.sin() as f32,
+            radiance: disc.radiance * intensity,
+            share,
+        }
+    }
+
+    /// Whether a unit direction lies within, by the squared chord, which has digits where a cosine has none.
+    #[inline(always)]
+    fn contains(&self, w: Vec3) -> bool {
+        (w - self.frame.n).length_squared() <= 2.0 * self.m
+    }
+
+    /// Whether any of it is above the horizon of a receiver.
+    #[inline(always)]
+    fn in_sight(&self, at: &Receiver) -> bool {
+        at.ng.dot(self.frame.n) >= -self.sin
+    }
+
+    fn sample(&self, u: Vec2) -> Vec3 {
+        let w = self.frame.to_world(warp::uniform_cone(u, self.m)).normalize();
+        if self.contains(w) {
+            return w;
+        }
+        // Rounding carried it over the rim.
+        w.lerp(self.frame.n, 1e-3).normalize()
     }
 }
 
 impl SkyLight {
-    /// From a sky. Errors where the intensity is not a number of at least 0, or the angle not finite.
-    pub fn new(skybox: Arc<dyn Skybox>, o: &SkyOptions) -> Result<Self> {
-        if !(o.intensity.is_finite() && o.intensity >= 0.0 && o.intensity <= f64::from(f32::MAX)) {
-            return Err(Error::Usage(format!(
-                "a sky's intensity is a number of at least 0, not {}",
-                o.intensity
-            )));
+    /// Prepares a sky for sampling.
+    ///
+    /// # Errors
+    /// An intensity that is not a number of at least 0, or an angle that is not finite.
+    pub fn new(sky: Arc<dyn Skybox>, options: &SkyOptions) -> Result<Self> {
+        let SkyOptions { intensity, rotate_y_deg, sampling } = *options;
+        if !(0.0..=f64::from(f32::MAX)).contains(&intensity) {
+            let message = format!("a sky's intensity is a number of at least 0, not {intensity}");
+            return Err(Error::Usage(message));
         }
-        if !o.rotate_y_deg.is_finite() {
+        if !rotate_y_deg.is_finite() {
             return Err(Error::Usage("the angle by which a sky is turned is not finite".into()));
         }
-        let (sin, cos) = o.rotate_y_deg.rem_euclid(360.0).to_radians().sin_cos();
-        let (table, map_total) = match skybox.constant() {
-            // The same everywhere: scattering finds it at once, and no table can help.
-            Some(c) if o.sampling != SkySampling::Table => (None, 4.0 * PI * f64::from(c.luminance())),
-            _ => build_table(skybox.as_ref(), o.sampling),
+        let turn = Turn::new(rotate_y_deg);
+        let plan = match sky.constant() {
+            Some(radiance) => plan_constant(&*sky, f64::from(radiance.luminance()), sampling),
+            None => plan::plan(&*sky, sampling),
         };
-        let discs = place_discs(skybox.discs());
-        let disc_total: f64 = skybox.discs().iter().map(disc_power).sum();
-        // What the table is sampled for is what it holds, less what compensation leaves to scattering.
-        let table_total = table.as_ref().map_or(0.0, |t| t.cells.total());
-        let disc_share = if disc_total > 0.0 { disc_total / (disc_total + table_total) } else { 0.0 };
-        Ok(SkyLight {
-            skybox,
-            intensity: o.intensity as f32,
-            turn: Turn { sin: sin as f32, cos: cos as f32 },
-            sampling: o.sampling,
-            table,
-            discs,
-            // With a table as well as discs both keep a tenth at least: a guard where one is blocked.
-            disc_share: if table_total > 0.0 && disc_share > 0.0 {
-                disc_share.clamp(0.1, 0.9)
-            } else {
-                disc_share
-            },
-            total: map_total + disc_total,
-        })
+        let intensity = intensity as f32;
+        let shares = sky.discs().iter().zip(&plan.disc_shares);
+        let discs: Vec<PlacedDisc> =
+            shares.map(|(d, &share)| PlacedDisc::new(d, turn, intensity, share)).collect();
+        let disc_total: f64 =
+            sky.discs().iter().map(|d| f64::from(d.radiance.luminance()) * d.solid_angle()).sum();
+        let map = match (plan.table, sampling) {
+            (Some((grid, cells)), _) => MapSampler::Table { grid, cells },
+            (None, SkySampling::Cosine) => MapSampler::Cosine,
+            (None, _) => MapSampler::None,
+        };
+        let map_share = if matches!(map, MapSampler::None) { 0.0 } else { plan.map_share };
+        let total = (plan.map_total + disc_total) * f64::from(intensity);
+        Ok(SkyLight { sky, intensity, turn, discs, map, map_share, total })
     }
 
-    /// Radiance from a unit direction in the sky's own axes, discs included, before `intensity`.
-    #[inline]
-    fn radiance(&self, d: Vec3) -> Rgb {
-        let mut sum = self.skybox.radiance(d);
-        for k in &self.discs {
-            if k.holds(d) {
-                sum += k.disc.radiance;
+    /// Bytes held, with the skybox.
+    pub fn memory(&self) -> u64 {
+        let table = if let MapSampler::Table { cells, .. } = &self.map { cells.memory() } else { 0 };
+        self.sky.memory() + table
+    }
+
+    /// For people: how the map is sampled.
+    pub fn describe(&self) -> String {
+        let map = match &self.map {
+            MapSampler::None => "by BSDF sampling alone".to_owned(),
+            MapSampler::Cosine => "by the cosine".to_owned(),
+            MapSampler::Table { grid, .. } => {
+                format!("by a table of {} x {} x {} cells", grid.count, grid.width, grid.height)
+            }
+        };
+        format!("map {map}, {} discs", self.discs.len())
+    }
+
+    #[inline(always)]
+    fn to_sky(&self, w: Vec3) -> Vec3 {
+        match self.turn {
+            None => w,
+            Some(t) => t.to_sky(w.as_dvec3()).as_vec3(),
+        }
+    }
+
+    #[inline(always)]
+    fn radiance(&self, w: Vec3) -> Rgb {
+        let mut l = self.sky.radiance(self.to_sky(w)) * self.intensity;
+        for disc in &self.discs {
+            if disc.contains(w) {
+                l += disc.radiance;
             }
         }
-        sum
+        l
     }
 
-    /// Density of table and discs together.
+    /// Sum of the probabilities of what a receiver can see.
+    #[inline(always)]
+    fn in_sight(&self, at: &Receiver) -> f64 {
+        let discs = self.discs.iter().filter(|d| d.in_sight(at)).map(|d| d.share);
+        self.map_share + discs.sum::<f64>()
+    }
+
+    /// Density of the map's sampler.
     #[inline]
-    fn density(&self, d: Vec3, cell: Option<f64>) -> f64 {
-        let mut pdf = 0.0;
-        for k in &self.discs {
-            if k.holds(d) {
-                pdf += self.disc_share * k.share * k.density;
+    fn map_pdf(&self, at: &Receiver, w: Vec3) -> f64 {
+        match &self.map {
+            MapSampler::None => 0.0,
+            MapSampler::Cosine if at.ns == Vec3::ZERO => f64::from(warp::UNIFORM_SPHERE_PDF),
+            MapSampler::Cosine => f64::from(warp::cosine_hemisphere_pdf(at.ns.dot(w))),
+            MapSampler::Table { grid, cells } => {
+                let d = w.as_dvec3();
+                let c = self.sky.locate(self.turn.map_or(d, |t| t.to_sky(d)));
+                let cell = |u: f64, n: u32| ((u * f64::from(n)) as u32).min(n - 1);
+                let pmf = cells.pmf(c.chart, cell(c.u, grid.width), cell(c.v, grid.height));
+                cell_density(&*self.sky, grid, c, pmf)
             }
         }
-        if let Some(t) = &self.table {
-            pdf += (1.0 - self.disc_share) * cell.unwrap_or_else(|| t.density(self.skybox.as_ref(), d));
-        }
-        pdf
     }
 
-    /// A direction in the sky's own axes and its density.
-    fn sample_direction(&self, u: [f32; 2]) -> Option<(Vec3, f64)> {
-        // An f32 pair cannot address the cells of a large table.
-        let [mut x, y] = extend_unit(u);
-        if x < self.disc_share {
-            x /= self.disc_share;
-            let k = self.discs.iter().find(|k| x < k.below).or(self.discs.last())?;
-            let within = ((x - (k.below - k.share)) / k.share).clamp(0.0, 1.0) as f32;
-            let d = k.frame.to_world(uniform_cone(Vec2::new(within, u[1]), k.height));
-            // Rounding may have put it a hair outside: it is inside by construction.
-            let inside = if k.holds(d) { 0.0 } else { self.disc_share * k.share * k.density };
-            return Some((d, self.density(d, None) + inside));
+    /// A direction to the map, with its density.
+    #[inline]
+    fn sample_map(&self, at: &Receiver, u: [f64; 2]) -> Option<(Vec3, f64)> {
+        match &self.map {
+            MapSampler::None => None,
+            MapSampler::Cosine => {
+                let u = Vec2::new(u[0] as f32, u[1] as f32);
+                let w = if at.ns == Vec3::ZERO {
+                    warp::uniform_sphere(u)
+                } else {
+                    Frame::from_z(at.ns).to_world(warp::cosine_hemisphere(u)).normalize()
+                };
+                Some((w, self.map_pdf(at, w)))
+            }
+            MapSampler::Table { grid, cells } => {
+                let s = cells.sample(u);
+                // Off the border by more than the rounding of a direction to f32 can carry it back over.
+                let inside = |u: f64, n: u32| {
+                    let rim = f64::from(n) * 1.5e-7;
+                    u.clamp(rim, 1.0 - rim)
+                };
+                let c = ChartPoint {
+                    chart: s.chart,
+                    u: (f64::from(s.x) + inside(s.du[0], grid.width)) / f64::from(grid.width),
+                    v: (f64::from(s.y) + inside(s.du[1], grid.height)) / f64::from(grid.height),
+                };
+                let d = self.sky.direction(c);
+                let w = self.turn.map_or(d, |t| t.to_world(d)).as_vec3();
+                Some((w, cell_density(&*self.sky, grid, c, s.pmf)))
+            }
         }
-        let t = self.table.as_ref()?;
-        x = (x - self.disc_share) / (1.0 - self.disc_share);
-        let cell = t.cells.sample([x, y]);
-        let c = ChartPoint {
-            chart: cell.chart,
-            u: (f64::from(cell.x) + cell.du[0]) / f64::from(t.grid.width),
-            v: (f64::from(cell.y) + cell.du[1]) / f64::from(t.grid.height),
-        };
-        let d = self.skybox.direction(c).as_vec3();
-        let per_chart = f64::from(t.grid.width) * f64::from(t.grid.height);
-        let cell = cell.pmf * per_chart / self.skybox.solid_angle_density(c);
-        Some((d, self.density(d, Some(cell))))
+    }
+
+    /// The density of the whole mixture, `map_pdf` known.
+    #[inline(always)]
+    fn mixture_pdf(&self, at: &Receiver, w: Vec3, map_pdf: f64) -> f32 {
+        let mut pdf = self.map_share * map_pdf;
+        let mut total = self.map_share;
+        for disc in self.discs.iter().filter(|d| d.in_sight(at)) {
+            total += disc.share;
+            if disc.contains(w) {
+                pdf += disc.share * f64::from(warp::uniform_cone_pdf(disc.m));
+            }
+        }
+        if total > 0.0 { (pdf / total) as f32 } else { 0.0 }
+    }
+}
+
+/// Density per solid angle within a cell of this probability.
+#[inline(always)]
+fn cell_density(sky: &dyn Skybox, grid: &ChartGrid, c: ChartPoint, pmf: f64) -> f64 {
+    let cells = f64::from(grid.width) * f64::from(grid.height);
+    let solid_angle = sky.solid_angle_density(c);
+    if pmf > 0.0 && solid_angle > 0.0 { pmf * cells / solid_angle } else { 0.0 }
+}
+
+/// A constant map needs no table to know what is left of it.
+fn plan_constant(sky: &dyn Skybox, luminance: f64, sampling: SkySampling) -> Plan {
+    let none = Plan {
+        table: None,
+        map_share: 0.0,
+        disc_shares: vec![0.0; sky.discs().len()],
+        map_total: 4.0 * PI * luminance,
+    };
+    match sampling {
+        SkySampling::Compensated if sky.discs().is_empty() => none,
+        SkySampling::Cosine if sky.discs().is_empty() => Plan { map_share: 1.0, ..none },
+        _ => plan::plan(sky, sampling),
     }
 }
 
 impl Light for SkyLight {
+    #[inline]
     fn sample_li(&self, at: &Receiver, u: [f32; 2]) -> Option<LightSample> {
-        if self.sampling == SkySampling::Cosine {
-            if at.ns == Vec3::ZERO {
-                return None;
-            }
-            let local = cosine_hemisphere(u.into());
-            let wi = Frame::from_z(at.ns).to_world(local);
-            let pdf = local.z * std::f32::consts::FRAC_1_PI;
-            let li = self.radiance(self.turn.to_sky(wi)) * self.intensity;
-            return (pdf > 0.0).then_some(LightSample { wi, dist: f32::INFINITY, li, pdf, delta: false });
-        }
-        let (d, pdf) = self.sample_direction(u)?;
-        let wi = self.turn.to_world(d);
-        // Behind both horizons nothing can scatter it to the side that asks.
-        if wi.dot(at.ng) < 0.0 && wi.dot(at.ns) < 0.0 {
+        let total = self.in_sight(at);
+        if total <= 0.0 {
             return None;
         }
-        let li = self.radiance(d) * self.intensity;
-        let pdf = pdf as f32;
-        (pdf > 0.0 && pdf.is_finite()).then_some(LightSample {
-            wi,
-            dist: f32::INFINITY,
-            li,
-            pdf,
-            delta: false,
-        })
+        let [mut x, y] = extend_unit(u);
+        x *= total;
+        let mut picked = None;
+        for disc in self.discs.iter().filter(|d| d.in_sight(at)) {
+            if x < disc.share {
+                let w = disc.sample(Vec2::new((x / disc.share) as f32, y as f32));
+                let map_pdf = if self.map_share > 0.0 { self.map_pdf(at, w) } else { 0.0 };
+                picked = Some((w, map_pdf));
+                break;
+            }
+            x -= disc.share;
+        }
+        let (wi, map_pdf) = match picked {
+            Some(p) => p,
+            None => self.sample_map(at, [x / self.map_share.max(f64::MIN_POSITIVE), y])?,
+        };
+        if wi.dot(at.ng) < 0.0 {
+            return None;
+        }
+        let pdf = self.mixture_pdf(at, wi, map_pdf);
+        (pdf > 0.0).then(|| LightSample { wi, dist: f32::INFINITY, li: self.radiance(wi), pdf, delta: false })
     }
 
+    #[inline]
     fn pdf_li(&self, at: &Receiver, end: &PathEnd) -> f32 {
-        match self.sampling {
-            SkySampling::Cosine => end.wi.dot(at.ns).max(0.0) * std::f32::consts::FRAC_1_PI,
-            _ => self.density(self.turn.to_sky(end.wi), None) as f32,
+        if end.vertex.is_some() || end.wi.dot(at.ng) < 0.0 {
+            return 0.0;
         }
+        let map_pdf = if self.map_share > 0.0 { self.map_pdf(at, end.wi) } else { 0.0 };
+        self.mixture_pdf(at, end.wi, map_pdf)
     }
 
+    #[inline]
     fn le(&self, end: &PathEnd) -> Rgb {
-        if end.vertex.is_some() {
-            return Rgb::BLACK;
-        }
-        self.radiance(self.turn.to_sky(end.wi)) * self.intensity
+        if end.vertex.is_some() { Rgb::BLACK } else { self.radiance(end.wi) }
     }
 
     fn at_infinity(&self) -> bool {
@@ -260,137 +390,23 @@ impl Light for SkyLight {
     }
 
     fn power(&self, extent: &Extent) -> f32 {
-        let r = f64::from(extent.radius);
-        (PI * r * r * self.total * f64::from(self.intensity)) as f32
+        (self.total * PI) as f32 * extent.radius * extent.radius
     }
 
     fn irradiance_closed_form(&self, _p: Vec3, n: Vec3) -> Option<Rgb> {
-        let map = self.skybox.irradiance_closed_form(self.turn.to_sky(n).as_dvec3())?;
-        self.discs.is_empty().then(|| map * self.intensity)
-    }
-}
-
-impl Disc {
-    #[inline]
-    fn holds(&self, d: Vec3) -> bool {
-        // |d - axis|^2 = 2 (1 - cos): no cancellation at small angles.
-        (d - self.frame.n).length_squared() <= 2.0 * self.height
-    }
-}
-
-impl Table {
-    #[inline]
-    fn density(&self, skybox: &dyn Skybox, d: Vec3) -> f64 {
-        let c = skybox.locate(d.as_dvec3());
-        let (w, h) = (self.grid.width, self.grid.height);
-        let x = ((c.u * f64::from(w)) as u32).min(w - 1);
-        let y = ((c.v * f64::from(h)) as u32).min(h - 1);
-        self.cells.pmf(c.chart, x, y) * f64::from(w) * f64::from(h) / skybox.solid_angle_density(c)
-    }
-}
-
-fn disc_power(d: &SkyDisc) -> f64 {
-    d.solid_angle() * f64::from(d.radiance.luminance())
-}
-
-fn place_discs(discs: &[SkyDisc]) -> Vec<Disc> {
-    let total: f64 = discs.iter().map(disc_power).sum();
-    let mut below = 0.0;
-    let lit = discs.iter().filter(|d| disc_power(d) > 0.0);
-    lit.map(|d| {
-        let share = disc_power(d) / total;
-        below += share;
-        Disc {
-            disc: *d,
-            frame: Frame::from_z(d.toward.as_vec3()),
-            height: (d.solid_angle() / (2.0 * PI)) as f32,
-            density: 1.0 / d.solid_angle(),
-            below,
-            share,
-        }
-    })
-    .collect()
-}
-
-/// Most cells of a table: 36 MB.
-const MAX_CELLS: usize = 1 << 23;
-
-/// Variance that a coarser table may add: it is looked up for every shadow ray, and should stay in cache.
-const COARSER_MAY_COST: f64 = 1.01;
-
-/// The table and the integral of luminance over the map.
-fn build_table(skybox: &dyn Skybox, sampling: SkySampling) -> (Option<Table>, f64) {
-    let mut grid = skybox.grid();
-    while grid.cells() > MAX_CELLS {
-        grid = ChartGrid { width: grid.width.div_ceil(2), height: grid.height.div_ceil(2), ..grid };
-    }
-    let mut integrals = skybox.cell_integrals(grid);
-    let total: f64 = integrals.iter().sum();
-    if sampling == SkySampling::Cosine {
-        return (None, total);
-    }
-    coarsen(skybox, &mut grid, &mut integrals);
-    if sampling == SkySampling::Compensated {
-        let mean = total / (4.0 * PI);
-        let omega = solid_angles(skybox, grid);
-        integrals.iter_mut().zip(omega).for_each(|(i, o)| *i = (*i - mean * o).max(0.0));
-    }
-    // What is left of a sky that is flat but for rounding is noise: scattering alone is better.
-    let left: f64 = integrals.iter().sum();
-    if left <= 1e-4 * total {
-        return (None, total);
-    }
-    let cells =
-        ChartDistribution::new(grid.count as usize, grid.width as usize, grid.height as usize, &integrals);
-    (cells.map(|cells| Table { cells, grid }), total)
-}
-
-/// Solid angles of the cells, by their middles: exact enough for choices, and no density depends on them.
-fn solid_angles(skybox: &dyn Skybox, grid: ChartGrid) -> Vec<f64> {
-    let (w, h) = (f64::from(grid.width), f64::from(grid.height));
-    let mut out = Vec::with_capacity(grid.cells());
-    for chart in 0..grid.count {
-        for y in 0..grid.height {
-            for x in 0..grid.width {
-                let c = ChartPoint { chart, u: (f64::from(x) + 0.5) / w, v: (f64::from(y) + 0.5) / h };
-                out.push(skybox.solid_angle_density(c) / (w * h));
+        let d = n.as_dvec3();
+        let mut e = self.sky.irradiance_closed_form(self.turn.map_or(d, |t| t.to_sky(d)))? * self.intensity;
+        for disc in &self.discs {
+            let cos = disc.frame.n.dot(n);
+            if cos.abs() < disc.sin {
+                // Part of it is below the horizon.
+                return None;
             }
+            e += disc.radiance * (std::f32::consts::PI * disc.sin * disc.sin * cos.max(0.0));
         }
-    }
-    out
-}
-
-/// Halves the table while the second moment of its estimate of the sky's irradiance grows by no more than
-/// [`COARSER_MAY_COST`] over that of the finest.
-fn coarsen(skybox: &dyn Skybox, grid: &mut ChartGrid, integrals: &mut Vec<f64>) {
-    let omega = solid_angles(skybox, *grid);
-    // Second moments within cells, from the finest grid on.
-    let mut squares: Vec<f64> =
-        integrals.iter().zip(&omega).map(|(i, o)| if *o > 0.0 { i * i / o } else { 0.0 }).collect();
-    let mut omega = omega;
-    let total: f64 = integrals.iter().sum();
-    while grid.width.is_multiple_of(2) && grid.height.is_multiple_of(2) && grid.width.min(grid.height) > 16 {
-        let half = |values: &[f64]| halved(values, *grid);
-        let (i2, s2, o2) = (half(integrals), half(&squares), half(&omega));
-        let moment: f64 =
-            i2.iter().zip(&s2).zip(&o2).map(|((i, s), o)| if *i > 0.0 { s * o / i } else { 0.0 }).sum();
-        // The finest table's moment is the square of the total.
-        if moment > COARSER_MAY_COST * total {
-            return;
-        }
-        *grid = ChartGrid { width: grid.width / 2, height: grid.height / 2, ..*grid };
-        (*integrals, squares, omega) = (i2, s2, o2);
+        Some(e)
     }
 }
 
-/// Sums of 2x2 cells.
-fn halved(values: &[f64], grid: ChartGrid) -> Vec<f64> {
-    let w = grid.width as usize;
-    values
-        .chunks_exact(2 * w)
-        .flat_map(|rows| {
-            let (a, b) = rows.split_at(w);
-            a.chunks_exact(2).zip(b.chunks_exact(2)).map(|(a, b)| a[0] + a[1] + b[0] + b[1])
-        })
-        .collect()
-}
+#[cfg(test)]
+mod tests;

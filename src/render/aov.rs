@@ -1,5 +1,6 @@
 //! Layers beside the picture, read from the first surface of each path.
 
+use super::film_layers;
 use crate::error::{Error, Result, unknown_name};
 use crate::integrators::FirstHit;
 use crate::scene::Scene;
@@ -29,7 +30,7 @@ pub struct AovRow {
     pub eval: fn(&FirstHit, &Scene) -> [f32; 4],
 }
 
-/// Every layer that reads first surfaces. `variance` and `spp` are layers of the film itself.
+/// Every layer that reads first surfaces. [`film_layers`] holds those of the film itself.
 pub static REGISTRY: &[AovRow] = &[
     AovRow {
         name: "albedo",
@@ -79,20 +80,14 @@ pub static REGISTRY: &[AovRow] = &[
     },
 ];
 
-/// Names of the layers that the film itself gives.
-pub const FILM_LAYERS: [(&str, &str); 2] = [
-    ("variance", "variance of the pixel's mean, per channel, estimated from its two half-buffers"),
-    ("spp", "samples of the pixel"),
-];
-
 /// Finds layers by their names; the film's own are left out.
 pub fn find(names: &[&str]) -> Result<Vec<&'static AovRow>> {
-    let known = || REGISTRY.iter().map(|r| r.name).chain(FILM_LAYERS.iter().map(|f| f.0));
+    let known = || REGISTRY.iter().map(|r| r.name).chain(film_layers::REGISTRY.iter().map(|f| f.name));
     let mut rows = Vec::new();
     for &name in names {
         match REGISTRY.iter().find(|r| r.name == name) {
             Some(row) => rows.push(row),
-            None if FILM_LAYERS.iter().any(|f| f.0 == name) => {}
+            None if film_layers::REGISTRY.iter().any(|f| f.name == name) => {}
             None => return Err(Error::Usage(unknown_name("layer", name, known()))),
         }
     }

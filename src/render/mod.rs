@@ -3,6 +3,7 @@
 pub mod aov;
 pub mod block;
 pub mod film;
+pub mod film_layers;
 pub mod fixed;
 pub mod layers;
 pub mod settings;

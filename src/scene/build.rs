@@ -226,7 +226,8 @@ fn gather_lights(
 ) -> Result<Lights> {
     let mut list: Vec<Arc<dyn crate::base::light::Light>> = Vec::new();
     if let Some(sky) = &desc.sky {
-        let skybox = build_node("sky", skyboxes::REGISTRY, &sky.node)?;
+        let preset = skyboxes::presets::expand(&sky.node);
+        let skybox = build_node("sky", skyboxes::REGISTRY, preset.as_ref().unwrap_or(&sky.node))?;
         list.push(Arc::new(lights::sky::SkyLight::new(
             skybox,
             &lights::sky::SkyOptions {

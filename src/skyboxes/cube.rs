@@ -65,6 +65,12 @@ impl Cube {
         Ok(Cube { faces, size })
     }
 
+    /// As [`Cube::new`], of faces known to be square and alike.
+    pub(super) fn of_floats(faces: Arc<[ImageData; 6]>) -> Self {
+        let size = faces[0].width;
+        Cube { faces, size }
+    }
+
     /// Radiance of a texel that may lie one beyond the edges of its face.
     fn tap(&self, face: usize, x: i32, y: i32) -> Rgb {
         let n = self.size as i32;
@@ -120,6 +126,19 @@ impl Cube {
             *l *= texel * r * r.sqrt();
         }
     }
+}
+
+/// The point of a face at s and t, on the cube of edge 2.
+pub(super) fn face_point(face: usize, s: f32, t: f32) -> Vec3 {
+    let f = &FACES[face];
+    f.major.as_vec3() + f.across.as_vec3() * s + f.up.as_vec3() * t
+}
+
+/// Where the plane of a face meets a direction, if it does.
+pub(super) fn face_coordinates(face: usize, d: Vec3) -> Option<(f32, f32)> {
+    let f = &FACES[face];
+    let m = d.dot(f.major.as_vec3());
+    (m > 1e-3).then(|| (d.dot(f.across.as_vec3()) / m, d.dot(f.up.as_vec3()) / m))
 }
 
 /// Face, s and t of a direction of any length.

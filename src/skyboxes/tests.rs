@@ -1,23 +1,21 @@
 //! What every kind of sky must keep, run on the sample parameters of its row.
 
 use super::REGISTRY;
-use crate::base::registry::{Node, Params, build, check};
 use crate::base::skybox::{ChartGrid, ChartPoint, Skybox};
+use crate::testing::rows::{Built, built, check_rows};
 use crate::testing::{TestRng, integrate_rect};
 use glam::DVec3;
 use std::f64::consts::PI;
-use std::sync::Arc;
 
 fn each(mut f: impl FnMut(&str, &dyn Skybox)) {
-    for row in REGISTRY {
-        let samples = (row.samples)();
-        assert!(!samples.is_empty(), "{} has no sample parameters", row.kind);
-        for (i, params) in samples.iter().enumerate() {
-            check(row.kind, row.params, params).unwrap();
-            let sky: Arc<dyn Skybox> = (row.build)(params).unwrap();
-            f(&format!("{} sample {i}", row.kind), &*sky);
-        }
+    for Built { label, it } in built::<dyn Skybox>("sky", REGISTRY) {
+        f(&label, &*it);
     }
+}
+
+#[test]
+fn rows_are_sound() {
+    check_rows("sky", REGISTRY);
 }
 
 fn random_point(sky: &dyn Skybox, rng: &mut TestRng) -> ChartPoint {
@@ -153,14 +151,4 @@ fn closed_forms_of_irradiance_match_quadrature() {
             );
         }
     });
-}
-
-#[test]
-fn unknown_kinds_and_parameters_are_explained() {
-    let node = |kind: &str, params| Node { kind: kind.into(), params, ..Node::default() };
-    let message = |n: &Node| build("sky", REGISTRY, n).err().map(|e| e.to_string()).unwrap_or_default();
-    let text = message(&node("cubes", Params::new()));
-    assert!(text.contains("did you mean \"cube\"?") && text.contains("gradient"), "{text}");
-    let text = message(&node("cube", Params::new()));
-    assert!(text.contains("needs `path`"), "{text}");
 }

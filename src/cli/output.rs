@@ -1,0 +1,78 @@
+//! Flags that say what is written, and the writing.
+
+use super::args::number_in;
+use crate::error::Result;
+use crate::image::picture::SampleKind;
+use crate::image::tonemap::{Look, ToneMap};
+use crate::image::write::{WriteOptions, check_writable, write_picture};
+use crate::render::Rendered;
+use crate::render::aov::{self, AovRow};
+use crate::render::film_layers::{self, FilmLayer};
+use crate::scene::desc::Background;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Flags of what is written.
+#[derive(Args)]
+#[command(next_help_heading = "Output")]
+pub struct OutputArgs {
+    /// The picture to write; the extension says how. May be given several times
+    #[arg(short, long = "output", required = true, value_name = "OUT.exr|png|jpg")]
+    outputs: Vec<PathBuf>,
+    /// Further layers, for EXR (see `skylit list aov`)
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    aov: Vec<String>,
+    /// Stops of exposure, for PNG and JPEG [default: 0]
+    #[arg(long, value_name = "EV", allow_hyphen_values = true, value_parser = |s: &str| number_in(s, -64.0..=64.0))]
+    exposure: Option<f64>,
+    /// Tone operator, for PNG and JPEG (see `skylit list tonemap`) [default: none]
+    #[arg(long, value_name = "NAME")]
+    tonemap: Option<String>,
+    /// Floats of 32 instead of 16 bits in EXR
+    #[arg(long)]
+    full_float: bool,
+}
+
+/// Names looked up and outputs tried.
+pub struct OutputPlan {
+    /// Layers read from first surfaces.
+    pub aovs: Vec<&'static AovRow>,
+    film_layers: Vec<&'static FilmLayer>,
+    look: Look,
+}
+
+impl OutputArgs {
+    /// Errors for unknown names, and where a picture could not be written.
+    pub fn check(&self) -> Result<OutputPlan> {
+        let names: Vec<&str> = self.aov.iter().map(String::as_str).collect();
+        let aovs = aov::find(&names)?;
+        let tonemap: Option<ToneMap> = self.tonemap.as_deref().map(str::parse).transpose()?;
+        self.outputs.iter().try_for_each(|path| check_writable(path))?;
+        let exposure = self.exposure.unwrap_or(0.0) as f32;
+        let film_layers = film_layers::REGISTRY.iter().filter(|f| names.contains(&f.name)).collect();
+        Ok(OutputPlan { aovs, film_layers, look: Look { exposure, tonemap: tonemap.unwrap_or_default() } })
+    }
+
+    /// Writes every output, each whole or not at all.
+    pub fn write(&self, plan: &OutputPlan, rendered: &Rendered, info: &PictureInfo) -> Result<()> {
+        let mut picture =
+            rendered.film.picture(if self.full_float { SampleKind::Float } else { SampleKind::Half });
+        rendered.layers.push_planes(&mut picture);
+        plan.film_layers.iter().for_each(|layer| (layer.push)(&rendered.film, &mut picture));
+        picture.metadata = info.metadata.clone();
+        let options = WriteOptions { look: plan.look, alpha: info.background == Background::Transparent };
+        self.outputs.iter().try_for_each(|path| {
+            write_picture(path, &picture, &options)?;
+            log::info!("wrote {}", path.display());
+            Ok(())
+        })
+    }
+}
+
+/// What a picture says of itself.
+pub struct PictureInfo {
+    /// PNG gets alpha where the background is to be transparent.
+    pub background: Background,
+    /// Key and value.
+    pub metadata: Vec<(String, String)>,
+}

@@ -1,0 +1,70 @@
+//! The progress bar: what is done, time left, samples per second. Drawn on a terminal alone.
+
+use crate::render::Progress;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use std::fmt::Write;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// Shows a render's progress.
+pub struct Bar {
+    bar: ProgressBar,
+    done: AtomicU64,
+    started: Instant,
+    /// With a limit the bar counts time, since nobody knows how many samples that will be.
+    limit: Option<Duration>,
+}
+
+/// Often enough to look alive, seldom enough to cost nothing.
+const DRAWS_PER_SECOND: u8 = 8;
+
+impl Bar {
+    /// Nothing is drawn if `quiet`, or where stderr is no terminal.
+    pub fn new(quiet: bool, limit: Option<Duration>) -> Self {
+        let target = if quiet {
+            ProgressDrawTarget::hidden()
+        } else {
+            ProgressDrawTarget::stderr_with_hz(DRAWS_PER_SECOND)
+        };
+        let bar = ProgressBar::with_draw_target(None, target);
+        Bar { bar, done: AtomicU64::new(0), started: Instant::now(), limit }
+    }
+
+    /// Takes it off the screen.
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+
+    fn rate(&self) -> String {
+        let seconds = self.started.elapsed().as_secs_f64().max(1e-3);
+        format!("{:.2} Msamples/s", self.done.load(Ordering::Relaxed) as f64 / seconds * 1e-6)
+    }
+}
+
+impl Progress for Bar {
+    fn begin(&self, samples: u64) {
+        if self.bar.is_hidden() {
+            return;
+        }
+        let percent = |state: &ProgressState, out: &mut dyn Write| {
+            let _ = write!(out, "{:3.0} %", state.fraction() * 100.0);
+        };
+        let template = "render {bar:32} {part}  {msg}  {eta} left";
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            self.bar.set_style(style.with_key("part", percent));
+        }
+        self.bar.set_length(self.limit.map_or(samples, |t| t.as_millis() as u64));
+    }
+
+    fn advance(&self, samples: u64) {
+        let done = self.done.fetch_add(samples, Ordering::Relaxed) + samples;
+        if self.bar.is_hidden() {
+            return;
+        }
+        match self.limit {
+            Some(_) => self.bar.set_position(self.started.elapsed().as_millis() as u64),
+            None => self.bar.set_position(done),
+        }
+        self.bar.set_message(self.rate());
+    }
+}

@@ -1,0 +1,229 @@
+//! `skylit render`: load, build, render, save.
+
+use super::args::{CropWindow, duration};
+use super::output::{OutputArgs, OutputPlan, PictureInfo};
+use super::progress::Bar;
+use super::scene_args::SceneArgs;
+use super::summary::Record;
+use super::{Setting, interrupt};
+use crate::base::intersectable::{BuildQuality, KernelMode, KernelOptions};
+use crate::base::registry::{self, Node, Value};
+use crate::error::{Error, Result, unknown_name};
+use crate::formats::native::MAX_SIDE;
+use crate::image::write::{check_file, write_file};
+use crate::integrators::Integrator;
+use crate::render::Renderer;
+use crate::render::settings::{RenderSettings, crop_window};
+use crate::sampler::Sampler;
+use crate::sampling::filter::PixelFilter;
+use crate::scene::build::{BuildOptions, build as build_scene};
+use crate::scene::desc::SceneDesc;
+use crate::{accel, integrators};
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Flags of `skylit render`.
+#[derive(Args)]
+pub struct RenderArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    #[command(flatten)]
+    output: OutputArgs,
+    #[command(flatten)]
+    sampling: SamplingArgs,
+    #[command(flatten)]
+    kernel: KernelArgs,
+    /// Write the summary as JSON, too
+    #[arg(long, value_name = "FILE.json", help_heading = "Output")]
+    stats: Option<PathBuf>,
+}
+
+#[derive(Args)]
+#[command(next_help_heading = "Sampling")]
+struct SamplingArgs {
+    /// Samples a pixel [default: 64]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    spp: Option<u32>,
+    /// Start rounds of samples until so much time has passed, such as 60s or 5m (at most --spp samples, if given)
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    time: Option<Duration>,
+    /// What is estimated along each path (see `skylit list integrator`) [default: path]
+    #[arg(long, value_name = "NAME")]
+    integrator: Option<String>,
+    /// Longest path in surfaces, the camera's first hit counted
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    max_depth: Option<u32>,
+    /// Point set [default: owen-sobol]
+    #[arg(long, value_name = "NAME")]
+    sampler: Option<String>,
+    /// Pixel filter [default: blackman-harris]
+    #[arg(long, value_name = "NAME")]
+    filter: Option<String>,
+    /// Seed of every random choice [default: 0]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// The part of the picture to render, as fractions of its width and height
+    #[arg(long, value_name = "x0,x1,y0,y1")]
+    cropwindow: Option<CropWindow>,
+}
+
+#[derive(Args)]
+#[command(next_help_heading = "Ray kernel")]
+struct KernelArgs {
+    /// Which kernel traces: auto, or one of `skylit list backend` [default: auto]
+    #[arg(long, value_name = "NAME")]
+    backend: Option<String>,
+    /// Whether rays may slip through between triangles for speed [default: robust]
+    #[arg(long, value_name = "robust|fast")]
+    kernel_mode: Option<ModeArg>,
+    /// Speed of the kernel's build against that of tracing [default: balanced]
+    #[arg(long, value_name = "fast|balanced|best")]
+    build: Option<QualityArg>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum ModeArg {
+    Robust,
+    Fast,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum QualityArg {
+    Fast,
+    Balanced,
+    Best,
+}
+
+/// Runs the verb.
+pub fn run(args: &RenderArgs, setting: &Setting) -> Result<()> {
+    let start = Instant::now();
+    let plan = args.check()?;
+    let desc = args.scene.load()?;
+    let settings = args.sampling.settings(&desc, &plan, setting.threads)?;
+    let renderer = Renderer { integrator: args.sampling.integrator(&desc)?, settings };
+    let load = start.elapsed();
+    if desc.objects.is_empty() {
+        log::warn!("the scene has no object: only the sky can be seen");
+    }
+    let scene = build_scene(desc, &args.kernel.options(setting.threads))?;
+    log::info!("{} threads, {}", setting.threads, scene.kernel.describe());
+    let bar = Bar::new(setting.quiet, renderer.settings.time);
+    let rendered = renderer.render(&scene, &bar);
+    bar.finish();
+    let rendered = rendered?;
+    let mut record = Record::new(&args.scene.input, &scene, &rendered, &renderer.settings);
+    let info = PictureInfo { background: scene.background, metadata: record.metadata() };
+    interrupt::hold_off(|| {
+        let saving = Instant::now();
+        args.output.write(&plan.output, &rendered, &info)?;
+        record.tell(load, saving.elapsed(), start.elapsed());
+        match &args.stats {
+            Some(path) => write_file(path, record.to_json()?.as_bytes()),
+            None => Ok(()),
+        }
+    })?;
+    if !setting.quiet {
+        eprint!("{record}");
+    }
+    Ok(())
+}
+
+/// What was looked up before anything was loaded.
+struct Plan {
+    output: OutputPlan,
+    sampler: Option<Sampler>,
+    filter: Option<PixelFilter>,
+}
+
+impl RenderArgs {
+    /// Finds all that is wrong with the flags, and outputs that cannot be written, before anything is loaded.
+    fn check(&self) -> Result<Plan> {
+        let s = &self.sampling;
+        if let Some(name) = &s.integrator {
+            registry::find("integrator", integrators::REGISTRY, &named(name))?;
+        }
+        if let Some(name) = self.kernel.backend.as_deref().filter(|n| *n != "auto") {
+            let known = accel::KERNELS.iter().map(|k| k.name);
+            if !known.clone().any(|k| k == name) {
+                return Err(Error::Usage(unknown_name("backend", name, ["auto"].into_iter().chain(known))));
+            }
+        }
+        if let Some(CropWindow(window)) = s.cropwindow {
+            crop_window(window, [MAX_SIDE; 2])?;
+        }
+        let output = self.output.check()?;
+        self.stats.as_deref().map_or(Ok(()), check_file)?;
+        Ok(Plan {
+            output,
+            sampler: s.sampler.as_deref().map(str::parse).transpose()?,
+            filter: s.filter.as_deref().map(str::parse).transpose()?,
+        })
+    }
+}
+
+impl SamplingArgs {
+    /// The command line's word counts more than the scene's.
+    fn settings(&self, scene: &SceneDesc, plan: &Plan, threads: usize) -> Result<RenderSettings> {
+        let usual = RenderSettings::new(scene.film.size);
+        let given = &scene.render;
+        let crop = self.cropwindow.map(|CropWindow(w)| crop_window(w, usual.size)).transpose()?;
+        let scene_sampler = given.sampler.as_deref().map(str::parse).transpose()?;
+        let scene_filter = given.filter.as_deref().map(str::parse).transpose()?;
+        // With a time limit the clock rules, unless the command line says otherwise.
+        let usual_spp = if self.time.is_some() { u32::MAX } else { given.spp.unwrap_or(usual.spp) };
+        Ok(RenderSettings {
+            crop: crop.unwrap_or(usual.crop),
+            spp: self.spp.unwrap_or(usual_spp),
+            time: self.time,
+            seed: self.seed.or(given.seed).unwrap_or(usual.seed),
+            sampler: plan.sampler.or(scene_sampler).unwrap_or(usual.sampler),
+            filter: plan.filter.or(scene_filter).unwrap_or(usual.filter),
+            threads,
+            aovs: plan.output.aovs.clone(),
+            ..usual
+        })
+    }
+
+    /// The scene's integrator keeps its parameters unless another one is asked for.
+    fn integrator(&self, scene: &SceneDesc) -> Result<Arc<dyn Integrator>> {
+        let default = integrators::REGISTRY.first().map_or("", |r| r.kind);
+        let of_scene = scene.render.integrator.clone().unwrap_or_else(|| named(default));
+        let mut node = match &self.integrator {
+            Some(name) if *name != of_scene.kind => named(name),
+            _ => of_scene,
+        };
+        if let Some(depth) = self.max_depth {
+            let row = registry::find("integrator", integrators::REGISTRY, &node)?;
+            if !row.params.iter().any(|p| p.name == MAX_DEPTH) {
+                return Err(Error::Usage(format!("the integrator \"{}\" has no --max-depth", node.kind)));
+            }
+            node.params.list.retain(|p| p.name != MAX_DEPTH);
+            node.params = std::mem::take(&mut node.params).with(MAX_DEPTH, Value::Number(f64::from(depth)));
+        }
+        registry::build("integrator", integrators::REGISTRY, &node)
+    }
+}
+
+const MAX_DEPTH: &str = "max_depth";
+
+fn named(kind: &str) -> Node {
+    Node { kind: kind.to_owned(), ..Node::default() }
+}
+
+impl KernelArgs {
+    fn options(&self, threads: usize) -> BuildOptions {
+        let quality = match self.build {
+            Some(QualityArg::Fast) => BuildQuality::Fast,
+            Some(QualityArg::Best) => BuildQuality::Best,
+            Some(QualityArg::Balanced) | None => BuildQuality::Balanced,
+        };
+        let mode = match self.kernel_mode {
+            Some(ModeArg::Fast) => KernelMode::Fast,
+            Some(ModeArg::Robust) | None => KernelMode::Robust,
+        };
+        let backend = self.backend.clone().unwrap_or_else(|| "auto".into());
+        BuildOptions { backend, kernel: KernelOptions { quality, mode, threads } }
+    }
+}

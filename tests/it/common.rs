@@ -1,0 +1,91 @@
+//! Scenes written as text, rendered in memory.
+
+use skylit::base::intersectable::{KernelMode, KernelOptions};
+use skylit::base::registry::{self, Node, Params, Value};
+use skylit::integrators;
+use skylit::render::settings::RenderSettings;
+use skylit::render::{Rendered, Renderer, Silent};
+use skylit::scene::build::{BuildOptions, build};
+use skylit::scene::{Scene, desc::SceneDesc};
+
+/// Loads a scene written as TOML.
+pub fn describe(toml: &str) -> SceneDesc {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("scene.toml");
+    std::fs::write(&path, toml).unwrap();
+    skylit::formats::load(&path).unwrap_or_else(|e| panic!("{e}\n{toml}"))
+}
+
+/// Builds a scene written as TOML, on a named kernel.
+pub fn scene_on(backend: &str, toml: &str) -> Scene {
+    build_on(backend, describe(toml))
+}
+
+/// Builds a description on a named kernel.
+pub fn build_on(backend: &str, desc: SceneDesc) -> Scene {
+    let kernel = KernelOptions { mode: KernelMode::Robust, ..KernelOptions::default() };
+    build(desc, &BuildOptions { backend: backend.into(), kernel }).unwrap()
+}
+
+/// As [`scene_on`] with the default kernel.
+pub fn scene(toml: &str) -> Scene {
+    scene_on("auto", toml)
+}
+
+/// An integrator by name, with number parameters.
+pub fn integrator(kind: &str, params: &[(&str, f64)]) -> std::sync::Arc<dyn integrators::Integrator> {
+    let mut p = Params::new();
+    for (name, value) in params {
+        let value = match *name {
+            "light_sampling" => Value::Bool(*value != 0.0),
+            _ => Value::Number(*value),
+        };
+        p = p.with(name, value);
+    }
+    let node = Node { kind: kind.into(), params: p, ..Node::default() };
+    registry::build("integrator", integrators::REGISTRY, &node).unwrap()
+}
+
+/// Renders with the given integrator.
+pub fn render(
+    scene: &Scene,
+    integrator: std::sync::Arc<dyn integrators::Integrator>,
+    size: [u32; 2],
+    spp: u32,
+) -> Rendered {
+    let settings = RenderSettings { spp, threads: 2, ..RenderSettings::new(size) };
+    Renderer { integrator, settings }.render(scene, &Silent).unwrap()
+}
+
+/// Mean radiance over the whole film and its standard error, from the tiles' replicates.
+pub struct Mean {
+    /// Mean luminance.
+    pub value: f64,
+    /// Standard error of it.
+    pub error: f64,
+}
+
+/// The mean of a film's luminance with its standard error.
+pub fn mean(rendered: &Rendered) -> Mean {
+    let film = &rendered.film;
+    let (mut sum, mut variance, mut area) = (0.0, 0.0, 0.0);
+    for tile in film.tiles() {
+        let e = film.tile_estimate(tile.x0, tile.y0).expect("at least two replicates have samples");
+        let a = tile.area() as f64;
+        sum += a * e.mean;
+        variance += a * a * e.variance;
+        area += a;
+    }
+    Mean { value: sum / area, error: variance.sqrt() / area }
+}
+
+/// Asserts that a mean equals an expected value within `sigmas` standard errors plus a systematic part.
+pub fn assert_mean(what: &str, m: &Mean, expected: f64, sigmas: f64, systematic: f64) {
+    let allowed = sigmas * m.error + systematic;
+    assert!(
+        (m.value - expected).abs() <= allowed,
+        "{what}: {} +- {}, expected {expected} (allowed difference {allowed})",
+        m.value,
+        m.error
+    );
+}
