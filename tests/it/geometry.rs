@@ -2,7 +2,6 @@
 
 use crate::common::{build_on, describe, integrator, render, scene, scene_on};
 use glam::{DAffine3, DVec3, Vec3};
-use skylit::base::intersectable::Intersectable;
 use skylit::base::ray::Ray;
 use skylit::render::Rendered;
 use skylit::scene::Scene;
