@@ -5,9 +5,10 @@ use super::picture::{Picture, SampleKind};
 use super::read::{DEFLATE_RATIO, check_size};
 use crate::base::image_data::{ImageData, Texels};
 use crate::error::{Error, Result};
-use exr::block::chunk::Chunk;
+use exr::block::chunk::{Chunk, CompressedBlock};
 use exr::block::reader::{ChunksReader, Reader};
 use exr::block::{BlockIndex, UncompressedBlock};
+use exr::compression::Compression;
 use exr::meta::MetaData;
 use exr::meta::attribute::{AttributeValue, ChannelDescription, SampleType, Text};
 use exr::meta::header::Header;
@@ -184,9 +185,11 @@ fn decode_layer(
         }
         let blocks: Vec<UncompressedBlock> = batch
             .into_par_iter()
-            .map(|chunk| UncompressedBlock::decompress_chunk(chunk, &meta, false))
-            .collect::<exr::error::Result<_>>()
-            .map_err(|e| damaged(path, e))?;
+            .map(|chunk| {
+                check_chunk(&chunk, &meta.headers[layer]).map_err(|what| damaged(path, what))?;
+                UncompressedBlock::decompress_chunk(chunk, &meta, false).map_err(|e| damaged(path, e))
+            })
+            .collect::<Result<_>>()?;
         for block in blocks {
             if block.index.layer != layer
                 || block.data.len() < block.index.pixel_size.area() * channels.bytes_per_pixel
@@ -200,6 +203,28 @@ fn decode_layer(
             }
         }
     }
+}
+
+/// The decoder of DWAA and DWAB allocates what a chunk's counters ask for, and a failed allocation ends the
+/// process; so they are compared with the chunk's pixels first.
+fn check_chunk(chunk: &Chunk, header: &Header) -> std::result::Result<(), &'static str> {
+    if !matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_)) {
+        return Ok(());
+    }
+    let data = match &chunk.compressed_block {
+        CompressedBlock::ScanLine(block) => &block.compressed_pixels_le,
+        CompressedBlock::Tile(block) => &block.compressed_pixels_le,
+        _ => return Err("deep data"),
+    };
+    let size = header.max_block_pixel_size();
+    // Whole 8 x 8 blocks of every channel, and four times that for run lengths that do not pay.
+    let samples = (size.x() + 8) * (size.y() + 8) * header.channels.list.len();
+    let most = 4 * 4 * samples as u64;
+    // OpenEXR's internal_dwa_compressor.h: eleven counters, of which 1, 6, 7, 8 and 9 are unpacked sizes.
+    let counter =
+        |i: usize| data.get(8 * i..8 * i + 8).and_then(|b| b.try_into().ok()).map(u64::from_le_bytes);
+    let sound = [1, 6, 7, 8, 9].into_iter().all(|i| counter(i).is_none_or(|n| n <= most));
+    if sound { Ok(()) } else { Err("a chunk claims more than its pixels") }
 }
 
 /// Native-endian samples to floats.

@@ -253,3 +253,18 @@ fn damaged_files_fail_cleanly() {
         }
     }
 }
+
+#[test]
+fn dwab_chunks_cannot_ask_for_any_amount_of_memory() {
+    let Some(dir) = data_dir() else { return };
+    let good = std::fs::read(dir.join("env/exr-dwab/studio.exr")).unwrap();
+    // A chunk's counters start with the version, 2; the unpacked sizes are counters 1 and 6 to 9.
+    let version = 2u64.to_le_bytes();
+    let start = good.windows(8).position(|w| w == version).expect("has a chunk");
+    for counter in [1, 6, 7, 8, 9] {
+        let mut hurt = good.clone();
+        hurt[start + 8 * counter..][..8].copy_from_slice(&(1u64 << 56).to_le_bytes());
+        let message = decode(&hurt).unwrap_err().to_string();
+        assert!(message.contains("claims more"), "counter {counter}: {message}");
+    }
+}
