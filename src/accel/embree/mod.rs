@@ -3,7 +3,7 @@
 //!
 //! Embree trusts its caller: a NaN in a ray ends the process of Debian's build. Every ray is checked here, and rays
 //! that are valid but extreme are moved and rescaled first; placements that f32 cannot carry go by double precision
-//! ([`plan`]). Panics in shapes and filters are kept for [`Intersectable::take_failure`].
+//! (`plan.rs`). Panics in shapes and filters are kept for [`Intersectable::take_failure`].
 #![allow(unsafe_code, reason = "the one user of embree-sys")]
 
 mod batch;

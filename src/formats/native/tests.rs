@@ -290,7 +290,7 @@ fn one_file_is_one_mesh_however_it_is_named() {
     assert_eq!(e.exit_code(), 3);
     assert!(e.to_string().contains("did you mean \"tri.ply\"?"), "{e}");
     let e = parse(&scene_file, &format!("{text}materials = ['a', 'a']"), &families()).err().unwrap();
-    assert!(e.to_string().contains("8:13: `materials` names 2, but the mesh has 1"), "{e}");
+    assert!(e.to_string().contains("7:13: `materials` names 2, but the mesh has 1"), "{e}");
 }
 
 #[test]
