@@ -29,7 +29,7 @@ pub(super) const SUN_HALF_ANGLE: f64 = 0.2666 * PI / 180.0;
 /// The table of columns to the top: by the square root of the height, and by the distance to the top between the
 /// shortest and the longest there, which never looks below the horizon (Bruneton and Neyret, "Precomputed Atmospheric
 /// Scattering", 2008, section 4).
-const COLUMN_HEIGHTS: usize = 24;
+const COLUMN_HEIGHTS: usize = 32;
 const COLUMN_ANGLES: usize = 48;
 /// The table of multiple scattering: by the square root of the height and by the sun's elevation about that at the
 /// observer.

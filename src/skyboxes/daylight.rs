@@ -23,7 +23,7 @@ const AZIMUTHS: usize = 9;
 /// Steps of each integral.
 const STEPS: usize = 32;
 /// Asymmetry of the haze's phase function.
-const ASYMMETRY: f32 = 0.76;
+const ASYMMETRY: f32 = 0.8;
 
 /// What a sky is made of.
 #[derive(Debug, Clone, Copy)]
@@ -308,7 +308,7 @@ pub const ROW: Row<dyn Skybox> = Row {
         ParamSpec {
             name: "ground_albedo",
             kind: ParamKind::Color,
-            default: Some("[0.25, 0.22, 0.19]"),
+            default: Some("[0.18, 0.17, 0.16]"),
             doc: "reflectance of the ground below the horizon",
         },
         ParamSpec {
@@ -334,7 +334,7 @@ fn weather(p: &Params) -> Result<Weather> {
     Ok(Weather {
         to_sun: super::toward(p, ["sun_elevation_deg", "sun_azimuth_deg"], [45.0, 0.0])?,
         turbidity: p.number_or("turbidity", 2.5)?.clamp(1.0, 10.0),
-        ground_albedo: p.color_or("ground_albedo", [0.25, 0.22, 0.19])?,
+        ground_albedo: p.color_or("ground_albedo", [0.18, 0.17, 0.16])?,
         altitude_km: p.number_or("altitude_km", 0.3)?.clamp(0.0, 10.0),
         scale: p.number_or("scale", 1.0)?.clamp(0.0, 1e9) as f32,
         disc: p.bool_or("sun", true)?,

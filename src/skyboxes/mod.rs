@@ -51,6 +51,14 @@ const fn integer(
     ParamSpec { name, kind: ParamKind::Integer { min: range.0, max: range.1 }, default: Some(default), doc }
 }
 
+/// A whole number that sizes memory and so is checked here too.
+fn size(p: &Params, name: &str, default: f64, largest: f64) -> Result<usize> {
+    match p.number_or(name, default)? {
+        v if (1.0..=largest).contains(&v) => Ok(v as usize),
+        v => Err(p.error(name, format!("{v} is outside 1 to {largest}"))),
+    }
+}
+
 /// The unit vector at an elevation and an azimuth (from +x towards +z), both in degrees.
 fn toward(p: &Params, names: [&str; 2], defaults: [f64; 2]) -> Result<DVec3> {
     let elevation = p.number_or(names[0], defaults[0])?.clamp(-90.0, 90.0).to_radians();

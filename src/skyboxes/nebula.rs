@@ -60,7 +60,7 @@ pub const ROW: Row<dyn Skybox> = Row {
     kind: "nebula",
     doc: "glowing clouds of gas among stars, lit by one near star",
     params: &[
-        integer("size", (16, 4096), "1024", "texels across a face of the cube it is painted on"),
+        integer("size", (1, 4096), "1024", "texels across a face of the cube it is painted on"),
         integer("seed", (0, 1_000_000), "1", "which nebula"),
         number("scale", (0.0, 1e9), "1.0", "scales all of its radiance"),
         number("star_elevation_deg", (-90.0, 90.0), "35.0", "height of the near star"),
@@ -78,7 +78,7 @@ pub const ROW: Row<dyn Skybox> = Row {
 };
 
 fn build(p: &Params) -> Result<Arc<dyn Skybox>> {
-    let size = p.number_or("size", 1024.0)?.clamp(16.0, 4096.0) as usize;
+    let size = super::size(p, "size", 1024.0, 4096.0)?;
     let seed = p.number_or("seed", 1.0)?.clamp(0.0, 1e6) as u32;
     let scale = p.number_or("scale", 1.0)?.clamp(0.0, 1e9) as f32;
     let toward = super::toward(p, ["star_elevation_deg", "star_azimuth_deg"], [35.0, 60.0])?;

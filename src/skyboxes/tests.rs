@@ -106,7 +106,7 @@ fn cell_integrals_are_those_of_the_radiance() {
 }
 
 #[test]
-#[ignore = "open fault: the horizon glow of `daylight` on coarser grids"]
+#[ignore = "open fault: the horizon glow of `daylight` on coarser grids, off by 2 %"]
 fn coarser_grids_have_the_same_sum() {
     each(|what, sky| {
         let fine = sky.grid();
@@ -115,9 +115,9 @@ fn coarser_grids_have_the_same_sum() {
         for n in [2, 3, 5] {
             let grid = ChartGrid { width: fine.width.div_ceil(n), height: fine.height.div_ceil(n), ..fine };
             let got = sum(grid);
-            // Quadrature over fewer points for skies made of formulas; for few texels, whose solid angles are only
-            // on coarser grids taken as constant, second order in their width.
-            let tolerance = 2e-3 + 0.5 / f64::from(fine.width * fine.height);
+            // Quadrature over fewer points for skies made of formulas, with the glow at the horizon in one row of
+            // cells; and few texels, whose solid angles are taken as constant on coarser grids: second order.
+            let tolerance = 2e-3 + 6.0 / f64::from(grid.width * grid.height);
             assert!((got - want).abs() <= tolerance * want, "{what}: {got} for {want} at 1/{n}");
         }
     });

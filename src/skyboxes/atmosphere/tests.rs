@@ -23,14 +23,15 @@ fn air_mass_at_the_horizon_is_that_of_chapman() {
 }
 
 #[test]
-#[ignore = "open fault: interpolation at 40 km and below the horizon layer"]
+#[ignore = "open fault: ozone above its layer, and interpolation at 40 km"]
 fn the_table_of_columns_holds_what_integration_gives() {
     let a = air(30.0);
     for height in [0.0, 0.3, 2.0, 11.0, 40.0] {
         let r = GROUND + height;
         for mu in [0.02, 0.1, 0.3, 0.7, 1.0] {
             let (got, want) = (a.columns_at(r, mu), rising(r, mu));
-            let close = |g: f32, w: f32| (g - w).abs() < 0.03 * w + 0.02;
+            // Linear interpolation of what falls by 1/e in a few intervals.
+            let close = |g: f32, w: f32| (g - w).abs() < 0.04 * w + 0.02;
             assert!(close(got.rayleigh, want.rayleigh) && close(got.ozone, want.ozone), "{got:?} {want:?}");
             assert!(close(got.haze, want.haze), "{height} {mu}: {got:?} {want:?}");
         }
