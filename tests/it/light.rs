@@ -1,6 +1,6 @@
 //! Whole renders against closed forms and against themselves: energy, multiple importance sampling, determinism.
 
-use crate::common::{assert_mean, integrator, mean, render, scene, scene_on};
+use crate::common::{assert_mean, integrator, mean, render, scene};
 use skylit::render::settings::RenderSettings;
 use skylit::render::{Renderer, Silent};
 
@@ -232,7 +232,7 @@ fn kernels_give_the_same_picture() {
     let films: Vec<_> = ["embree", "brute"]
         .into_iter()
         .map(|backend| {
-            let s = scene_on(backend, PARTS);
+            let s = crate::common::scene_on(backend, PARTS);
             render(&s, integrator("path", &[("max_depth", 3.0)]), [32, 24], 4).film
         })
         .collect();
