@@ -1,5 +1,6 @@
 //! Where light comes from. A sky is a light like any other; a path that leaves the scene has met it.
 
+use crate::base::directions::Directions;
 use crate::base::space::RenderSpace;
 use crate::base::vertex::Vertex;
 use crate::color::Rgb;
@@ -25,8 +26,10 @@ pub struct LightSample {
     pub wi: Vec3,
     /// Distance to it; infinite for the sky.
     pub dist: f32,
-    /// Radiance arriving (for a delta light: irradiance at normal incidence), before anything blocks it.
-    pub li: Rgb,
+    /// Radiance arriving (for a delta light: irradiance at normal incidence), before anything blocks it. None from a
+    /// light at infinity whose radiance is dear to look up: it is asked for all directions that are not blocked
+    /// together, by [`Light::le_escaped`].
+    pub li: Option<Rgb>,
     /// Density per solid angle; 1 for a delta light.
     pub pdf: f32,
     /// Whether no other way of sampling can meet this light.
@@ -62,6 +65,19 @@ pub trait Light: Send + Sync {
 
     /// Radiance that leaves `end` against the direction of travel.
     fn le(&self, end: &PathEnd) -> Rgb;
+
+    /// [`Light::le`] of many paths that leave the scene in these directions, bit for bit; as many as `out` has room
+    /// for.
+    fn le_escaped(&self, wi: Directions, out: &mut [Rgb]) {
+        for (i, out) in out.iter_mut().enumerate() {
+            *out = self.le(&PathEnd { wi: wi.get(i), vertex: None });
+        }
+    }
+
+    /// What a sample of this light brings, looked up now if it was not.
+    fn arriving(&self, sample: &LightSample) -> Rgb {
+        sample.li.unwrap_or_else(|| self.le(&PathEnd { wi: sample.wi, vertex: None }))
+    }
 
     /// Whether paths that leave the scene end on this light.
     fn at_infinity(&self) -> bool {

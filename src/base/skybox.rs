@@ -1,5 +1,6 @@
 //! Radiance by direction, cut into charts so that one light can sample every kind of sky.
 
+use crate::base::directions::Directions;
 use crate::color::Rgb;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -42,10 +43,10 @@ pub trait Skybox: Send + Sync {
     /// Radiance of the map alone, without the discs.
     fn radiance(&self, d: Vec3) -> Rgb;
 
-    /// [`Skybox::radiance`] of many directions; both slices are of one length.
-    fn radiance_batch(&self, d: &[Vec3], out: &mut [Rgb]) {
-        for (o, &d) in out.iter_mut().zip(d) {
-            *o = self.radiance(d);
+    /// [`Skybox::radiance`] of many directions, bit for bit; as many as `out` has room for.
+    fn radiance_batch(&self, d: Directions, out: &mut [Rgb]) {
+        for (i, o) in out.iter_mut().enumerate() {
+            *o = self.radiance(d.get(i));
         }
     }
 

@@ -3,6 +3,7 @@
 
 pub mod ambient_occlusion;
 pub mod direct;
+mod escapes;
 pub mod normals;
 pub mod path;
 

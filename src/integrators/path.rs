@@ -1,6 +1,7 @@
 //! Unidirectional path tracing with next-event estimation: light samples and material samples are combined by
 //! multiple importance sampling (Veach 1997, ch. 9), long paths end by Russian roulette.
 
+use super::escapes::Escapes;
 use super::{CameraBatch, FirstHit, Integrator, PathId, PathResults, Workspace};
 use crate::base::light::{PathEnd, Receiver};
 use crate::base::material::{Material, Prepared};
@@ -74,8 +75,12 @@ struct PathState {
 /// A light sample that waits for its shadow ray.
 #[derive(Clone, Copy)]
 struct Pending {
+    /// What the path brings: radiance, or what radiance is to be multiplied by.
     value: Rgb,
+    /// Index into the block.
     index: u32,
+    /// The light that has to be asked for the radiance, if it did not say.
+    ask: Option<u32>,
 }
 
 /// Path states, kept from block to block.
@@ -84,6 +89,7 @@ pub struct PathScratch {
     states: Vec<PathState>,
     next: Vec<PathState>,
     pending: Vec<Pending>,
+    escapes: Escapes,
 }
 
 impl Integrator for PathTracer {
@@ -99,7 +105,7 @@ impl Integrator for PathTracer {
             std::mem::swap(&mut rays, &mut work.next);
             let block = Block { scene, ids: &batch.ids, depth };
             if depth > self.max_depth && !scene.features.emitting_surfaces {
-                block.leave_or_end(&rays, work, &paths, out);
+                block.leave_or_end(&rays, work, &mut paths, out);
                 paths.next.clear();
             } else {
                 self.next_depth(&block, &rays, work, &mut paths, out);
@@ -146,7 +152,7 @@ impl PathTracer {
         paths.begin(&mut work.next, &mut work.shadow);
         for i in 0..rays.len() {
             let Some(hit) = work.hits.get(i) else {
-                out.li[i] = background(scene, rays.direction(i));
+                paths.escapes.push(i as u32, rays.direction(i));
                 continue;
             };
             let v = scene.vertex(&rays.get(i), hit, batch.spread);
@@ -163,6 +169,7 @@ impl PathTracer {
             block.add_emission(&state, &v, rays.direction(i), out);
             self.scatter(&block, &state, &v, work, paths);
         }
+        add_background(scene, &mut paths.escapes, out);
         block.resolve_shadows(work, paths, out);
     }
 
@@ -181,7 +188,7 @@ impl PathTracer {
         for i in 0..rays.len() {
             let state = paths.states[i];
             let Some(hit) = work.hits.get(i) else {
-                block.add_escape(&state, rays.direction(i), out);
+                paths.escapes.push(i as u32, rays.direction(i));
                 continue;
             };
             let v = block.scene.vertex(&rays.get(i), hit, 0.0);
@@ -190,6 +197,7 @@ impl PathTracer {
                 self.scatter(block, &state, &v, work, paths);
             }
         }
+        block.add_escapes(paths, out);
         block.resolve_shadows(work, paths, out);
     }
 
@@ -266,6 +274,7 @@ impl PathScratch {
     fn begin(&mut self, next: &mut RayBatch, shadow: &mut RayBatch) {
         self.next.clear();
         self.pending.clear();
+        self.escapes.clear();
         next.clear();
         shadow.clear();
     }
@@ -297,26 +306,37 @@ impl Block<'_> {
             return;
         }
         let e = s.material.eval(s.prepared, s.wo, s.v.frame.to_local(l.wi));
-        let value = state.beta * e.f_cos * l.li;
+        let value = state.beta * e.f_cos * l.li.unwrap_or(Rgb::WHITE);
         if value.is_black() {
             return;
         }
         let pdf = chosen.pmf * l.pdf;
         let weight = if l.delta { 1.0 } else { power(pdf, e.pdf) };
         work.shadow.push(&s.v.spawn_to(l.wi, l.dist, key(id, self.depth) ^ SHADOW_KEY));
-        paths.pending.push(Pending { value: value * (weight / pdf), index: state.index });
+        let ask = l.li.is_none().then_some(chosen.light);
+        paths.pending.push(Pending { value: value * (weight / pdf), index: state.index, ask });
     }
 
     /// Traces the shadow rays of this depth and adds what arrives.
-    fn resolve_shadows(&self, work: &mut Workspace, paths: &PathScratch, out: &mut PathResults) {
+    fn resolve_shadows(&self, work: &mut Workspace, paths: &mut PathScratch, out: &mut PathResults) {
         if work.shadow.is_empty() {
             return;
         }
         work.counts.shadow += work.shadow.len() as u64;
         self.scene.kernel.occluded_batch(&work.shadow, &mut work.blocked, Coherence::Incoherent);
-        for (p, blocked) in paths.pending.iter().zip(&work.blocked) {
-            if !blocked {
-                out.li[p.index as usize] += p.value;
+        let PathScratch { pending, escapes, .. } = paths;
+        let arriving = || (0..).zip(&*pending).filter(|(i, _)| !work.blocked[*i as usize]);
+        for (_, p) in arriving().filter(|(_, p)| p.ask.is_none()) {
+            out.li[p.index as usize] += p.value;
+        }
+        for &light in &self.scene.lights.at_infinity {
+            escapes.clear();
+            for (i, _) in arriving().filter(|(_, p)| p.ask == Some(light)) {
+                escapes.push(i, work.shadow.direction(i as usize));
+            }
+            for e in escapes.ask(&*self.scene.lights.list[light as usize]) {
+                let p = &pending[e.number as usize];
+                out.li[p.index as usize] += p.value * e.le;
             }
         }
     }
@@ -326,16 +346,16 @@ impl Block<'_> {
         &self,
         rays: &RayBatch,
         work: &mut Workspace,
-        paths: &PathScratch,
+        paths: &mut PathScratch,
         out: &mut PathResults,
     ) {
         work.counts.shadow += rays.len() as u64;
         self.scene.kernel.occluded_batch(rays, &mut work.blocked, Coherence::Incoherent);
-        for (i, state) in paths.states.iter().enumerate() {
-            if !work.blocked[i] {
-                self.add_escape(state, rays.direction(i), out);
-            }
+        paths.escapes.clear();
+        for (i, _) in work.blocked.iter().enumerate().filter(|(_, blocked)| !**blocked) {
+            paths.escapes.push(i as u32, rays.direction(i));
         }
+        self.add_escapes(paths, out);
     }
 
     /// The light that a path's end lies on, if it does.
@@ -349,11 +369,18 @@ impl Block<'_> {
         }
     }
 
-    /// A path that leaves the scene ends on the lights at infinity.
-    #[inline]
-    fn add_escape(&self, state: &PathState, wi: Vec3, out: &mut PathResults) {
-        for &light in &self.scene.lights.at_infinity {
-            self.add_end(state, light, &PathEnd { wi, vertex: None }, out);
+    /// Paths that leave the scene end on the lights at infinity.
+    fn add_escapes(&self, paths: &mut PathScratch, out: &mut PathResults) {
+        let PathScratch { states, escapes, .. } = paths;
+        let lights = &self.scene.lights;
+        for &light in &lights.at_infinity {
+            for e in escapes.ask(&*lights.list[light as usize]).filter(|e| !e.le.is_black()) {
+                let state = &states[e.number as usize];
+                let end = PathEnd { wi: e.wi, vertex: None };
+                let pdf = || lights.pdf(light, &end, &state.from);
+                let weight = if state.pdf.is_finite() { power(state.pdf, pdf()) } else { 1.0 };
+                out.li[state.index as usize] += state.beta * e.le * weight;
+            }
         }
     }
 
@@ -374,16 +401,20 @@ fn key(id: &PathId, depth: u32) -> u32 {
     ray_key(id.key, id.index, depth)
 }
 
-/// What a camera ray shows that meets nothing.
-#[inline]
-pub(super) fn background(scene: &Scene, wi: Vec3) -> Rgb {
+/// What camera rays show that meet nothing; they are numbered as in the batch.
+pub(super) fn add_background(scene: &Scene, escapes: &mut Escapes, out: &mut PathResults) {
     match scene.background {
         Background::Sky => {
-            let end = PathEnd { wi, vertex: None };
-            scene.lights.at_infinity.iter().map(|&l| scene.lights.list[l as usize].le(&end)).sum()
+            for &light in &scene.lights.at_infinity {
+                for e in escapes.ask(&*scene.lights.list[light as usize]) {
+                    out.li[e.number as usize] += e.le;
+                }
+            }
         }
-        Background::Transparent => Rgb::BLACK,
-        Background::Color(c) => Rgb::from(c),
+        Background::Transparent => {}
+        Background::Color(c) => {
+            escapes.numbers().iter().for_each(|&i| out.li[i as usize] = Rgb::from(c));
+        }
     }
 }
 

@@ -69,7 +69,7 @@ impl Light for AreaLight {
         if li.is_black() || pdf <= 0.0 || !pdf.is_finite() {
             return None;
         }
-        Some(LightSample { wi: s.wi, dist: s.dist, li, pdf, delta: false })
+        Some(LightSample { wi: s.wi, dist: s.dist, li: Some(li), pdf, delta: false })
     }
 
     fn pdf_li(&self, at: &Receiver, end: &PathEnd) -> f32 {

@@ -65,7 +65,7 @@ impl Light for Directional {
         (!self.irradiance.is_black()).then_some(LightSample {
             wi: self.to_light,
             dist: f32::INFINITY,
-            li: self.irradiance,
+            li: Some(self.irradiance),
             pdf: 1.0,
             delta: true,
         })

@@ -71,7 +71,7 @@ impl Light for PointLight {
         (dist > 0.0 && li.is_finite() && !li.is_black()).then(|| LightSample {
             wi: wi.as_vec3(),
             dist: dist as f32,
-            li,
+            li: Some(li),
             pdf: 1.0,
             delta: true,
         })

@@ -2,6 +2,7 @@
 
 mod plan;
 
+use crate::base::directions::{DirectionBatch, Directions};
 use crate::base::light::{Extent, Light, LightSample, PathEnd, Receiver};
 use crate::base::skybox::{ChartGrid, ChartPoint, SkyDisc, Skybox};
 use crate::color::Rgb;
@@ -237,7 +238,13 @@ impl SkyLight {
 
     #[inline(always)]
     fn radiance(&self, w: Vec3) -> Rgb {
-        let mut l = self.sky.radiance(self.to_sky(w)) * self.intensity;
+        self.with_discs(self.sky.radiance(self.to_sky(w)), w)
+    }
+
+    /// The light towards `w` where the map has this radiance.
+    #[inline(always)]
+    fn with_discs(&self, map: Rgb, w: Vec3) -> Rgb {
+        let mut l = map * self.intensity;
         for disc in &self.discs {
             if disc.contains(w) {
                 l += disc.radiance;
@@ -368,7 +375,7 @@ impl Light for SkyLight {
             return None;
         }
         let pdf = self.mixture_pdf(at, wi, map_pdf);
-        (pdf > 0.0).then(|| LightSample { wi, dist: f32::INFINITY, li: self.radiance(wi), pdf, delta: false })
+        (pdf > 0.0).then_some(LightSample { wi, dist: f32::INFINITY, li: None, pdf, delta: false })
     }
 
     #[inline]
@@ -383,6 +390,19 @@ impl Light for SkyLight {
     #[inline]
     fn le(&self, end: &PathEnd) -> Rgb {
         if end.vertex.is_some() { Rgb::BLACK } else { self.radiance(end.wi) }
+    }
+
+    fn le_escaped(&self, wi: Directions, out: &mut [Rgb]) {
+        match self.turn {
+            None => self.sky.radiance_batch(wi, out),
+            Some(_) => {
+                let turned: DirectionBatch = (0..wi.len()).map(|i| self.to_sky(wi.get(i))).collect();
+                self.sky.radiance_batch(turned.view(), out);
+            }
+        }
+        for (i, out) in out.iter_mut().enumerate() {
+            *out = self.with_discs(*out, wi.get(i));
+        }
     }
 
     fn at_infinity(&self) -> bool {

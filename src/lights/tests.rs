@@ -78,7 +78,7 @@ fn delta_lights_have_their_closed_form_in_any_space() {
             let sampled = |light: &dyn Light, p: DVec3| {
                 let s = light.sample_li(&receiver(p, DVec3::ZERO), [0.5; 2])?;
                 assert!(s.delta && s.pdf == 1.0);
-                Some(s.li.luminance() * n.as_vec3().dot(s.wi).max(0.0))
+                Some(light.arriving(&s).luminance() * n.as_vec3().dot(s.wi).max(0.0))
             };
             let closed = world.irradiance_closed_form(p.as_vec3(), n.as_vec3()).expect("known").luminance();
             let a = sampled(&*world, p).unwrap_or(0.0);
@@ -118,7 +118,7 @@ fn irradiance(light: &AreaLight, n: DVec3, samples: u32) -> (f64, f64) {
     for _ in 0..samples {
         let e = light
             .sample_li(&at, rng.vec2().to_array())
-            .map_or(0.0, |s| f64::from(s.li.r) * n.dot(s.wi.as_dvec3()).max(0.0) / f64::from(s.pdf));
+            .map_or(0.0, |s| f64::from(light.arriving(&s).r) * n.dot(s.wi.as_dvec3()).max(0.0) / f64::from(s.pdf));
         sum += e;
         sum2 += e * e;
     }

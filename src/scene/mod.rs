@@ -132,9 +132,15 @@ impl Lights {
         let l = &self.list[light as usize];
         let le = l.le(end);
         let pdf = match from {
-            Some(r) if !le.is_black() => self.sampler.pmf(r, light) * l.pdf_li(r, end),
+            Some(r) if !le.is_black() => self.pdf(light, end, r),
             _ => 0.0,
         };
         Emitted { le, pdf }
+    }
+
+    /// Density per solid angle with which light sampling from `from` finds `end` on `light`, choice of light included.
+    #[inline]
+    pub fn pdf(&self, light: u32, end: &PathEnd, from: &Receiver) -> f32 {
+        self.sampler.pmf(from, light) * self.list[light as usize].pdf_li(from, end)
     }
 }

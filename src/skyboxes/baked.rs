@@ -2,6 +2,7 @@
 
 use super::cube::{self, Cube};
 use super::noise::{Points, WIDE};
+use crate::base::directions::Directions;
 use crate::base::image_data::{ImageData, Texels};
 use crate::base::skybox::{ChartGrid, ChartPoint, SkyDisc, Skybox};
 use crate::color::Rgb;
@@ -9,7 +10,6 @@ use crate::math::simd;
 use crate::sampler::hash::mix64;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use std::sync::Arc;
 
 /// The finest table made, cells across a face: stars are too small and too dim to be worth finding one by one.
 const TABLE: u32 = 128;
@@ -77,7 +77,7 @@ impl Canvas {
     fn cube(self) -> Cube {
         let n = self.size;
         let image = |t| ImageData { width: n, height: n, texels: Texels::F32(t) };
-        Cube::of_floats(Arc::new(self.faces.map(image)))
+        Cube::of_alike(&self.faces.map(image))
     }
 
     /// Adds small round spots, each a Gaussian of its flux (irradiance facing it) however fine the texels.
@@ -173,6 +173,10 @@ impl Skybox for Baked {
     #[inline]
     fn radiance(&self, d: Vec3) -> Rgb {
         self.cube.radiance(d)
+    }
+
+    fn radiance_batch(&self, d: Directions, out: &mut [Rgb]) {
+        self.cube.radiance_batch(d, out);
     }
 
     fn grid(&self) -> ChartGrid {

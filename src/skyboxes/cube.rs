@@ -3,11 +3,14 @@
 //! Faces follow the OpenGL convention (OpenGL 4.6 core profile, table 8.19): with t upwards, (s, t) times the
 //! magnitude of the major axis is +X (-z, y), -X (z, y), +Y (x, -z), -Y (x, z), +Z (x, y), -Z (-x, y).
 
-use super::texel::{self, CellSums, Spread, Tap};
+use super::texel::{self, CellSums, Spread};
+use super::tiles::{self, CHUNK, Footprint, Footprints, Strides, Tiles};
+use crate::base::directions::Directions;
 use crate::base::image_data::{ImageData, Texels};
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::base::skybox::{ChartGrid, ChartPoint, Skybox, integrate_cells};
 use crate::color::Rgb;
+use crate::math::simd;
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
@@ -34,16 +37,22 @@ const TABLE_8BIT: usize = 256;
 /// over a texel, of second order in its width, below a thousandth.
 const SMALL: usize = 32;
 
+/// The largest faces: their texels are numbered by 32 bits.
+const LARGEST: usize = 26_000;
+
 /// A cube map. Bilinear filtering runs on across edges; at the eight corners, where three texels meet and a fourth
 /// is missing, their average stands in for it, which keeps the whole continuous.
 pub struct Cube {
-    faces: Arc<[ImageData; 6]>,
+    /// Faces of `size + 2` texels a side: with a border of one texel, those of the neighbours.
+    tiles: Tiles,
     size: usize,
+    /// The finest table that its texels are worth.
+    table: usize,
 }
 
 impl Cube {
     /// From square faces of one size and pixel format, in the order +X -X +Y -Y +Z -Z; errors say what differs.
-    pub fn new(faces: Arc<[ImageData; 6]>) -> Result<Self, String> {
+    pub fn new(faces: &[ImageData; 6]) -> Result<Self, String> {
         let size = faces[0].width;
         for f in faces.iter() {
             if f.width != f.height {
@@ -59,62 +68,64 @@ impl Cube {
                 return Err("cube faces must be of one pixel format; some are 8-bit and some are not".into());
             }
         }
-        if size == 0 || size > 1 << 15 {
-            return Err(format!("cube faces must be 1 to 32768 pixels wide, not {size}"));
+        if size == 0 || size > LARGEST {
+            return Err(format!("cube faces must be 1 to {LARGEST} pixels wide, not {size}"));
         }
-        Ok(Cube { faces, size })
+        Ok(Cube::of_alike(faces))
     }
 
     /// As [`Cube::new`], of faces known to be square and alike.
-    pub(super) fn of_floats(faces: Arc<[ImageData; 6]>) -> Self {
-        let size = faces[0].width;
-        Cube { faces, size }
+    pub(super) fn of_alike(faces: &[ImageData; 6]) -> Self {
+        let n = faces[0].width;
+        let source = |face: usize, x: usize, y: usize| {
+            let (x, y) = (x as i32 - 1, y as i32 - 1);
+            let inside = |i: i32| (0..n as i32).contains(&i);
+            // Nothing is at the corners of the border; any texel will do.
+            let (face, x, y) = if inside(x) || inside(y) { source_texel(n, face, x, y) } else { (face, 0, 0) };
+            (face, y * n + x)
+        };
+        let tiles = Tiles::new(faces, 6, [n + 2, n + 2], source);
+        Cube { tiles, size: n, table: texel::table_size(&faces[0].texels, n, TABLE_8BIT) }
     }
 
-    /// Radiance of a texel that may lie one beyond the edges of its face.
-    fn tap(&self, face: usize, x: i32, y: i32) -> Rgb {
-        let n = self.size as i32;
-        let inside = |i: i32| (0..n).contains(&i);
-        match (inside(x), inside(y)) {
-            (true, true) => self.faces[face].texel(x as usize, y as usize),
-            (false, false) => {
-                let (cx, cy) = (x.clamp(0, n - 1), y.clamp(0, n - 1));
-                (self.tap(face, cx, cy) + self.tap(face, x, cy) + self.tap(face, cx, y)) * (1.0 / 3.0)
-            }
-            _ => {
-                // In units of half a texel, the centre of a texel beyond the edge lies at n + 1 on a minor axis
-                // and n on the major one; folded over the edge, at n and n - 1.
-                let f = &FACES[face];
-                let (s, t) = (f64::from(2 * x + 1 - n), f64::from(n - 1 - 2 * y));
-                let n = f64::from(n);
-                let folded = |m: f64| m.clamp(-n, n);
-                let p = f.major * (n - 1.0) + f.across * folded(s) + f.up * folded(t);
-                let (face, s, t) = project64(p);
-                let texel = |s: f64| ((s * n + n - 1.0) * 0.5).round().clamp(0.0, n - 1.0) as usize;
-                self.faces[face].texel(texel(s), texel(-t))
-            }
-        }
+    /// The texel at the corner of a face's border: what its three neighbours have on average.
+    fn corner(&self, face: usize, x: usize, y: usize) -> Rgb {
+        let inner = |i: usize| i.clamp(1, self.size);
+        let at = |x, y| self.tiles.texel(face, x, y);
+        (at(inner(x), inner(y)) + at(x, inner(y)) + at(inner(x), y)) * (1.0 / 3.0)
     }
 
+    /// The mix at one of the eight corners of the cube.
     #[cold]
     #[inline(never)]
-    fn across_edges(&self, face: usize, t: Tap) -> Rgb {
-        let at = |dx, dy| self.tap(face, t.x + dx, t.y + dy);
-        texel::mix([at(0, 0), at(1, 0), at(0, 1), at(1, 1)], t)
+    fn mix_at_corner(&self, d: Vec3) -> Rgb {
+        let p = project(d);
+        let half = 0.5 * self.size as f32;
+        let [x, y] = [p.s, p.t].map(|c| c * half + (half + 0.5));
+        let (ix, iy) = (x as usize, y as usize);
+        let n = self.size;
+        let at = |x: usize, y: usize| {
+            if (x == 0 || x > n) && (y == 0 || y > n) {
+                self.corner(p.face as usize, x, y)
+            } else {
+                self.tiles.texel(p.face as usize, x, y)
+            }
+        };
+        let v = [at(ix, iy), at(ix + 1, iy), at(ix, iy + 1), at(ix + 1, iy + 1)];
+        tiles::mix(v, x - ix as f32, y - iy as f32)
     }
 
     /// Luminance times solid angle of the texels of row `y`, with one more on every side.
     fn row(&self, face: usize, y: i64, out: &mut Vec<f32>) {
-        let n = self.size as i64;
-        let tap = |x: i64| self.tap(face, x as i32, y as i32).luminance();
-        out.push(tap(-1));
-        if (0..n).contains(&y) {
-            let start = (y * n) as usize;
-            texel::luminances(&self.faces[face].texels, start..start + n as usize, out);
-        } else {
-            out.extend((0..n).map(tap));
+        let n = self.size;
+        let row = (y + 1) as usize;
+        self.tiles.luminances(face, row, 0..n + 2, out);
+        if row == 0 || row == n + 1 {
+            let end = out.len() - 1;
+            out[end - n - 1] = self.corner(face, 0, row).luminance();
+            out[end] = self.corner(face, n + 1, row).luminance();
         }
-        out.push(tap(n));
+        let n = n as i64;
         let inv = 1.0 / self.size as f32;
         let at = |i: i64| (2 * i.clamp(0, n - 1) + 1 - n) as f32 * inv;
         let t = at(y);
@@ -126,6 +137,25 @@ impl Cube {
             *l *= texel * r * r.sqrt();
         }
     }
+}
+
+/// The texel of another face that stands where texel (x, y) of `face` would, one of which lies one beyond its edge.
+fn source_texel(n: usize, face: usize, x: i32, y: i32) -> (usize, usize, usize) {
+    let inside = |i: i32| (0..n as i32).contains(&i);
+    if inside(x) && inside(y) {
+        return (face, x as usize, y as usize);
+    }
+    // In units of half a texel, the centre of a texel beyond the edge lies at n + 1 on a minor axis and n on the major
+    // one; folded over the edge, at n and n - 1.
+    let f = &FACES[face];
+    let n = n as i32;
+    let (s, t) = (f64::from(2 * x + 1 - n), f64::from(n - 1 - 2 * y));
+    let n = f64::from(n);
+    let folded = |m: f64| m.clamp(-n, n);
+    let p = f.major * (n - 1.0) + f.across * folded(s) + f.up * folded(t);
+    let (face, s, t) = project64(p);
+    let texel = |s: f64| ((s * n + n - 1.0) * 0.5).round().clamp(0.0, n - 1.0) as usize;
+    (face, texel(s), texel(-t))
 }
 
 /// The point of a face at s and t, on the cube of edge 2.
@@ -141,12 +171,22 @@ pub(super) fn face_coordinates(face: usize, d: Vec3) -> Option<(f32, f32)> {
     (m > 1e-3).then(|| (d.dot(f.across.as_vec3()) / m, d.dot(f.up.as_vec3()) / m))
 }
 
-/// Face, s and t of a direction of any length.
+/// A point of a face.
+#[derive(Clone, Copy)]
+struct FacePoint {
+    face: u32,
+    /// To the right, in [-1, 1].
+    s: f32,
+    /// Downwards, in [-1, 1].
+    t: f32,
+}
+
+/// The point of the cube towards a direction of any length. Without branches, so that many can be done at once.
 #[inline(always)]
-fn project(d: Vec3) -> (usize, f32, f32) {
+fn project(d: Vec3) -> FacePoint {
     let a = d.abs();
-    let x_major = a.x >= a.y && a.x >= a.z;
-    let y_major = !x_major && a.y >= a.z;
+    let x_major = (a.x >= a.y) & (a.x >= a.z);
+    let y_major = !x_major & (a.y >= a.z);
     let major = if x_major {
         d.x
     } else if y_major {
@@ -156,16 +196,77 @@ fn project(d: Vec3) -> (usize, f32, f32) {
     };
     let sign = 1f32.copysign(major);
     let s = if x_major { -d.z } else { d.x } * if y_major { 1.0 } else { sign };
-    let t = if y_major { -d.z * sign } else { d.y };
-    let face = if x_major {
+    let t = if y_major { d.z * sign } else { -d.y };
+    let axis = if x_major {
         0
     } else if y_major {
         2
     } else {
         4
-    } + usize::from(sign < 0.0);
+    };
     let inv = 1.0 / major.abs();
-    (face, s * inv, t * inv)
+    FacePoint { face: axis + (major.to_bits() >> 31), s: s * inv, t: t * inv }
+}
+
+/// Where lookups stand among the texels.
+#[derive(Clone, Copy)]
+struct Placing {
+    strides: Strides,
+    /// Half of the texels of a side.
+    half: f32,
+    /// Texels of a side.
+    size: u32,
+}
+
+impl Placing {
+    /// The footprint of a direction, and whether it has one of the eight corners in it.
+    #[inline(always)]
+    fn footprint(self, d: Vec3) -> (Footprint, bool) {
+        let p = project(d);
+        // Texel 0 is that of the border, whose centre lies half a texel before the face.
+        let middle = self.half + 0.5;
+        let (x, y) = (p.s * self.half + middle, p.t * self.half + middle);
+        // Rounding leaves both in [0.5, size + 0.5]; the limit is for what is no direction.
+        let (ix, iy) = ((x as i32).clamp(0, self.size as i32), (y as i32).clamp(0, self.size as i32));
+        let f = [x - ix as f32, y - iy as f32];
+        let at_end = |i: i32| (i == 0) | (i == self.size as i32);
+        (self.strides.footprint(p.face, ix as u32, iy as u32, f), at_end(ix) & at_end(iy))
+    }
+}
+
+/// Looks up a batch.
+struct Lookups<'a> {
+    cube: &'a Cube,
+    d: Directions<'a>,
+    out: &'a mut [Rgb],
+}
+
+impl simd::Kernel for Lookups<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let placing = self.cube.placing();
+        let mut footprints = Footprints::NONE;
+        let mut corners = [false; CHUNK];
+        for ((_, d), out) in self.d.chunks(CHUNK).zip(self.out.chunks_mut(CHUNK)) {
+            let mut any_corner = false;
+            let n = d.len().min(CHUNK);
+            let (xs, ys, zs) = (&d.x[..n], &d.y[..n], &d.z[..n]);
+            for i in 0..n {
+                let (f, corner) = placing.footprint(Vec3::new(xs[i], ys[i], zs[i]));
+                footprints.set(i, f);
+                corners[i] = corner;
+                any_corner |= corner;
+            }
+            self.cube.tiles.mix_all(&footprints, out);
+            if any_corner {
+                for i in (0..n).filter(|&i| corners[i]) {
+                    out[i] = self.cube.mix_at_corner(d.get(i));
+                }
+            }
+        }
+    }
 }
 
 /// [`project`] in double, for tables.
@@ -184,22 +285,26 @@ fn project64(d: DVec3) -> (usize, f64, f64) {
     (face, d.dot(f.across) * inv, d.dot(f.up) * inv)
 }
 
+impl Cube {
+    #[inline(always)]
+    fn placing(&self) -> Placing {
+        Placing { strides: self.tiles.strides(), half: 0.5 * self.size as f32, size: self.size as u32 }
+    }
+}
+
 impl Skybox for Cube {
     #[inline]
     fn radiance(&self, d: Vec3) -> Rgb {
-        let (face, s, t) = project(d);
-        let half = 0.5 * self.size as f32;
-        let tap = Tap::new(half + s * half, half - t * half);
-        let last = self.size as u32 - 1;
-        if (tap.x as u32) < last && (tap.y as u32) < last {
-            texel::bilinear(&self.faces[face].texels, self.size, tap)
-        } else {
-            self.across_edges(face, tap)
-        }
+        let (f, corner) = self.placing().footprint(d);
+        if corner { self.mix_at_corner(d) } else { self.tiles.mix(f) }
+    }
+
+    fn radiance_batch(&self, d: Directions, out: &mut [Rgb]) {
+        simd::dispatch(Lookups { cube: self, d, out });
     }
 
     fn grid(&self) -> ChartGrid {
-        let n = texel::table_size(&self.faces[0].texels, self.size, TABLE_8BIT) as u32;
+        let n = self.table as u32;
         ChartGrid { count: 6, width: n, height: n }
     }
 
@@ -233,7 +338,7 @@ impl Skybox for Cube {
     }
 
     fn memory(&self) -> u64 {
-        self.faces.iter().map(texel::bytes).sum()
+        self.tiles.memory()
     }
 }
 
@@ -251,7 +356,7 @@ pub const ROW: Row<dyn Skybox> = Row {
         super::ENCODING,
     ],
     build: |p| {
-        let cube = Cube::new(p.faces("path")?).map_err(|m| p.error("path", m))?;
+        let cube = Cube::new(&*p.faces("path")?).map_err(|m| p.error("path", m))?;
         Ok(Arc::new(cube))
     },
     samples,

@@ -15,6 +15,7 @@ pub mod presets;
 mod spectrum;
 pub mod sphere;
 mod texel;
+mod tiles;
 
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row};
 use crate::base::skybox::Skybox;

@@ -1,10 +1,11 @@
 //! What every kind of sky must keep, run on the sample parameters of its row.
 
 use super::REGISTRY;
+use crate::base::directions::DirectionBatch;
 use crate::base::skybox::{ChartGrid, ChartPoint, Skybox};
 use crate::testing::rows::{Built, built, check_rows};
 use crate::testing::{TestRng, integrate_rect};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 
 fn each(mut f: impl FnMut(&str, &dyn Skybox)) {
@@ -127,9 +128,15 @@ fn coarser_grids_have_the_same_sum() {
 fn batches_and_constants_agree_with_single_lookups() {
     each(|what, sky| {
         let mut rng = TestRng::new(4);
-        let d: Vec<_> = (0..100).map(|_| rng.direction()).collect();
+        // Corners of cubes and poles among them, and more than any batch is cut into.
+        let mut d: Vec<_> = (0..1000).map(|_| rng.direction()).collect();
+        for i in 0..8 {
+            let end = |bit| if i >> bit & 1 == 0 { 1.0 } else { -1.0 };
+            d.push((Vec3::new(end(0), end(1), end(2)) + 1e-3 * rng.direction()).normalize());
+        }
+        d.extend([Vec3::Y, Vec3::NEG_Y, Vec3::NEG_X]);
         let mut out = vec![crate::color::Rgb::BLACK; d.len()];
-        sky.radiance_batch(&d, &mut out);
+        sky.radiance_batch(d.iter().copied().collect::<DirectionBatch>().view(), &mut out);
         for (&d, &l) in d.iter().zip(&out) {
             assert_eq!(sky.radiance(d), l, "{what}");
             assert!(l.is_finite() && l.r >= 0.0 && l.g >= 0.0 && l.b >= 0.0, "{what}: {l:?} towards {d}");

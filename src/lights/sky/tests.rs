@@ -102,7 +102,7 @@ fn densities_of_samples_are_those_of_their_directions() {
                 let Some(s) = light.sample_li(&at, rng.vec2().to_array()) else { continue };
                 let pdf = light.pdf_li(&at, &away(s.wi));
                 assert!((pdf - s.pdf).abs() <= 1e-5 * s.pdf, "{what} {sampling:?}: {pdf} {}", s.pdf);
-                assert_eq!(s.li, light.le(&away(s.wi)), "{what}");
+                assert_eq!(light.arriving(&s), light.le(&away(s.wi)), "{what}");
                 assert!(s.wi.dot(at.ng) >= 0.0 && s.dist == f32::INFINITY && !s.delta);
             }
         }
@@ -160,7 +160,7 @@ fn irradiance(light: &SkyLight, n: Vec3, samples: u32) -> (f64, f64) {
         if let Some(s) = light.sample_li(&at, rng.vec2().to_array()) {
             let cos = s.wi.dot(n).max(0.0);
             let weight = mis::balance(s.pdf, warp::cosine_hemisphere_pdf(cos));
-            e += f64::from(s.li.luminance() * cos * weight / s.pdf);
+            e += f64::from(light.arriving(&s).luminance() * cos * weight / s.pdf);
         }
         sum += e;
         sum2 += e * e;

@@ -19,7 +19,7 @@ fn direction_coded(n: usize) -> Cube {
             (d.normalize() * 0.5 + 0.5).to_array()
         })
     });
-    Cube::new(Arc::new(faces)).unwrap()
+    Cube::new(&faces).unwrap()
 }
 
 fn noise(n: usize, seed: u64) -> Cube {
@@ -28,7 +28,7 @@ fn noise(n: usize, seed: u64) -> Cube {
         let texels: Vec<[f32; 3]> = (0..n * n).map(|_| [rng.f32(), rng.f32(), rng.f32()]).collect();
         ImageData { width: n, height: n, texels: Texels::F32(texels) }
     };
-    Cube::new(Arc::new([0; 6].map(face))).unwrap()
+    Cube::new(&[0; 6].map(face)).unwrap()
 }
 
 #[test]
@@ -83,11 +83,11 @@ fn no_seam_at_edges_and_corners() {
 fn texel_centres_are_exact() {
     let n = 16;
     let cube = noise(n, 9);
-    for chart in 0..6 {
+    for chart in 0..6usize {
         for i in 0..n * n {
             let at = |i: usize| (i as f64 + 0.5) / n as f64;
-            let d = cube.direction(ChartPoint { chart, u: at(i % n), v: at(i / n) }).as_vec3();
-            let diff = cube.radiance(d) - cube.faces[chart as usize].texel(i % n, i / n);
+            let d = cube.direction(ChartPoint { chart: chart as u32, u: at(i % n), v: at(i / n) }).as_vec3();
+            let diff = cube.radiance(d) - cube.tiles.texel(chart, i % n + 1, i / n + 1);
             // Four roundings of positions up to 16.
             assert!(diff.map(f32::abs).max_component() < 1e-5);
         }
@@ -97,7 +97,7 @@ fn texel_centres_are_exact() {
 #[test]
 fn unequal_faces_are_refused() {
     let face = |w, h| texel::picture(w, h, |_| [0.0; 3]);
-    let error = |faces: [ImageData; 6]| Cube::new(Arc::new(faces)).err().unwrap_or_default();
+    let error = |faces: [ImageData; 6]| Cube::new(&faces).err().unwrap_or_default();
     assert!(error([0; 6].map(|_| face(4, 3))).contains("square"));
     let mut faces = [0; 6].map(|_| face(4, 4));
     faces[3] = face(8, 8);

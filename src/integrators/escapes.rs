@@ -1,0 +1,57 @@
+//! Paths that leave the scene, gathered so that a light at infinity is asked for all of them at once: its lookups then
+//! wait for memory together and not one after the other.
+
+use crate::base::directions::{DirectionBatch, Directions};
+use crate::base::light::Light;
+use crate::color::Rgb;
+use glam::Vec3;
+
+/// Directions in which paths leave, each with a number of the caller's.
+#[derive(Default)]
+pub struct Escapes {
+    directions: DirectionBatch,
+    numbers: Vec<u32>,
+    radiance: Vec<Rgb>,
+}
+
+/// One that has been answered.
+#[derive(Debug, Clone, Copy)]
+pub struct Escape {
+    /// The number it was given.
+    pub number: u32,
+    /// Its unit direction.
+    pub wi: Vec3,
+    /// What the light shows there.
+    pub le: Rgb,
+}
+
+impl Escapes {
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        self.directions.clear();
+        self.numbers.clear();
+    }
+
+    /// Appends one.
+    #[inline]
+    pub fn push(&mut self, number: u32, wi: Vec3) {
+        self.directions.push(wi);
+        self.numbers.push(number);
+    }
+
+    /// The numbers of all of them.
+    pub fn numbers(&self) -> &[u32] {
+        &self.numbers
+    }
+
+    /// All of them with the radiance of a light at infinity.
+    pub fn ask(&mut self, light: &dyn Light) -> impl Iterator<Item = Escape> {
+        self.radiance.resize(self.numbers.len(), Rgb::BLACK);
+        let directions: Directions = self.directions.view();
+        if !directions.is_empty() {
+            light.le_escaped(directions, &mut self.radiance);
+        }
+        let all = self.numbers.iter().zip(&self.radiance).enumerate();
+        all.map(move |(i, (&number, &le))| Escape { number, wi: directions.get(i), le })
+    }
+}
