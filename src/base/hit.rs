@@ -37,6 +37,12 @@ impl HitBatch {
         self.path.resize(n, 0);
     }
 
+    /// Whether all are misses.
+    pub fn none(&self) -> bool {
+        // By pieces without a branch inside, which is vector code.
+        self.prim.chunks(64).all(|c| c.iter().fold(true, |none, &p| none & (p == NO_PRIMITIVE)))
+    }
+
     /// Hit `i`, or none.
     #[inline]
     pub fn get(&self, i: usize) -> Option<Hit> {

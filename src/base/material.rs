@@ -68,6 +68,11 @@ pub trait Material: Send + Sync {
     /// f |cos| and density for a pair of directions; zero for delta lobes.
     fn eval(&self, m: &Prepared, wo: Vec3, wi: Vec3) -> BsdfEval;
 
+    /// Whether [`Material::sample`] reads `uc` at all; if not, none is made.
+    fn picks_lobe(&self) -> bool {
+        true
+    }
+
     /// Samples `wi`. `uc` picks a lobe where there are several. None if the path ends here.
     fn sample(&self, m: &Prepared, wo: Vec3, u: [f32; 2], uc: f32) -> Option<BsdfSample>;
 

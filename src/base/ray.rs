@@ -1,5 +1,6 @@
 //! Rays, one by one and in batches.
 
+use crate::base::directions::Directions;
 use glam::Vec3;
 
 /// A segment `o + t d`, `tnear <= t <= tfar`; `d` need not be of unit length.
@@ -129,6 +130,11 @@ impl RayBatch {
             tfar: self.tfar[i],
             key: self.key[i],
         }
+    }
+
+    /// All directions.
+    pub fn directions(&self) -> Directions<'_> {
+        Directions { x: &self.dx, y: &self.dy, z: &self.dz }
     }
 
     /// Direction of ray `i`.

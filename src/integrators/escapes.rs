@@ -4,6 +4,8 @@
 use crate::base::directions::{DirectionBatch, Directions};
 use crate::base::light::Light;
 use crate::color::Rgb;
+use crate::scene::Scene;
+use crate::scene::desc::Background;
 use glam::Vec3;
 
 /// Directions in which paths leave, each with a number of the caller's.
@@ -39,11 +41,6 @@ impl Escapes {
         self.numbers.push(number);
     }
 
-    /// The numbers of all of them.
-    pub fn numbers(&self) -> &[u32] {
-        &self.numbers
-    }
-
     /// All of them with the radiance of a light at infinity.
     pub fn ask(&mut self, light: &dyn Light) -> impl Iterator<Item = Escape> {
         self.radiance.resize(self.numbers.len(), Rgb::BLACK);
@@ -53,5 +50,41 @@ impl Escapes {
         }
         let all = self.numbers.iter().zip(&self.radiance).enumerate();
         all.map(move |(i, (&number, &le))| Escape { number, wi: directions.get(i), le })
+    }
+
+    /// Adds to `li`, by number, what camera rays show that leave the scene.
+    pub fn add_background(&mut self, scene: &Scene, li: &mut [Rgb]) {
+        match scene.background {
+            Background::Sky => {
+                for &light in &scene.lights.at_infinity {
+                    for e in self.ask(&*scene.lights.list[light as usize]) {
+                        li[e.number as usize] += e.le;
+                    }
+                }
+            }
+            Background::Transparent => {}
+            Background::Color(c) => {
+                self.numbers.iter().for_each(|&i| li[i as usize] = Rgb::from(c));
+            }
+        }
+    }
+
+    /// What [`Escapes::add_background`] makes of black where all rays leave, in order: the same bits, nothing copied.
+    pub fn fill_background(&mut self, scene: &Scene, wi: Directions, li: &mut [Rgb]) {
+        match scene.background {
+            Background::Sky => {
+                let mut lights = scene.lights.at_infinity.iter().map(|&l| &scene.lights.list[l as usize]);
+                if let Some(first) = lights.next() {
+                    first.le_escaped(wi, li);
+                }
+                for light in lights {
+                    self.radiance.resize(li.len(), Rgb::BLACK);
+                    light.le_escaped(wi, &mut self.radiance);
+                    li.iter_mut().zip(&self.radiance).for_each(|(sum, &le)| *sum += le);
+                }
+            }
+            Background::Transparent => {}
+            Background::Color(c) => li.fill(Rgb::from(c)),
+        }
     }
 }

@@ -14,7 +14,6 @@ use crate::sampler::ray_key;
 use crate::sampler::{Dim, Slot};
 use crate::sampling::mis::power;
 use crate::scene::Scene;
-use crate::scene::desc::Background;
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -150,6 +149,10 @@ impl PathTracer {
         scene.kernel.intersect_batch(rays, &mut work.hits, Coherence::Coherent);
         let block = Block { scene, ids: &batch.ids, depth: 1 };
         paths.begin(&mut work.next, &mut work.shadow);
+        if work.hits.none() {
+            // Most batches of most pictures: nothing but sky, and nothing to sort out.
+            return paths.escapes.fill_background(scene, rays.directions(), &mut out.li);
+        }
         for i in 0..rays.len() {
             let Some(hit) = work.hits.get(i) else {
                 paths.escapes.push(i as u32, rays.direction(i));
@@ -169,7 +172,7 @@ impl PathTracer {
             block.add_emission(&state, &v, rays.direction(i), out);
             self.scatter(&block, &state, &v, work, paths);
         }
-        add_background(scene, &mut paths.escapes, out);
+        paths.escapes.add_background(scene, &mut out.li);
         block.resolve_shadows(work, paths, out);
     }
 
@@ -237,14 +240,19 @@ impl PathTracer {
         let id = block.ids[state.index as usize];
         let dim = |slot| Dim::at(block.depth, slot);
         let u = id.sampler.get_2d(id.index, dim(Slot::BsdfUv));
-        let lobe = id.sampler.get_2d(id.index, dim(Slot::LobeAndRoulette));
+        let roulette = block.depth >= self.roulette_depth && block.depth < self.max_depth;
+        let lobe = if roulette || s.material.picks_lobe() {
+            id.sampler.get_2d(id.index, dim(Slot::LobeAndRoulette))
+        } else {
+            [0.0; 2]
+        };
         let Some(b) = s.material.sample(s.prepared, s.wo, u, lobe[0]) else { return };
         let wi = s.v.frame.to_world(b.wi);
         let mut beta = state.beta * b.weight;
         if beta.is_black() || !s.v.is_consistent(wi) {
             return;
         }
-        if block.depth >= self.roulette_depth && block.depth < self.max_depth {
+        if roulette {
             // Survival by throughput; never certain, so that no path of a white scene lives for ever.
             let q = beta.max_component().min(0.95);
             if lobe[1] >= q {
@@ -399,23 +407,6 @@ const SHADOW_KEY: u32 = 0x9e37_79b9;
 #[inline]
 fn key(id: &PathId, depth: u32) -> u32 {
     ray_key(id.key, id.index, depth)
-}
-
-/// What camera rays show that meet nothing; they are numbered as in the batch.
-pub(super) fn add_background(scene: &Scene, escapes: &mut Escapes, out: &mut PathResults) {
-    match scene.background {
-        Background::Sky => {
-            for &light in &scene.lights.at_infinity {
-                for e in escapes.ask(&*scene.lights.list[light as usize]) {
-                    out.li[e.number as usize] += e.le;
-                }
-            }
-        }
-        Background::Transparent => {}
-        Background::Color(c) => {
-            escapes.numbers().iter().for_each(|&i| out.li[i as usize] = Rgb::from(c));
-        }
-    }
 }
 
 /// The record of a first surface for AOVs.

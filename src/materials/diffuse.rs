@@ -60,6 +60,10 @@ impl Material for Diffuse {
     }
 
     #[inline]
+    fn picks_lobe(&self) -> bool {
+        false
+    }
+
     fn sample(&self, m: &Prepared, wo: Vec3, u: [f32; 2], _uc: f32) -> Option<BsdfSample> {
         let mut wi = cosine_hemisphere(Vec2::from(u));
         let pdf = cosine_hemisphere_pdf(wi.z);

@@ -76,6 +76,10 @@ impl Material for Emissive {
         self.body.eval(m, wo, wi)
     }
 
+    fn picks_lobe(&self) -> bool {
+        self.body.picks_lobe()
+    }
+
     fn sample(&self, m: &Prepared, wo: Vec3, u: [f32; 2], uc: f32) -> Option<BsdfSample> {
         self.body.sample(m, wo, u, uc)
     }

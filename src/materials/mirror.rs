@@ -47,6 +47,10 @@ impl Material for Mirror {
     }
 
     #[inline]
+    fn picks_lobe(&self) -> bool {
+        false
+    }
+
     fn sample(&self, m: &Prepared, wo: Vec3, _u: [f32; 2], _uc: f32) -> Option<BsdfSample> {
         let wi = Vec3::new(-wo.x, -wo.y, wo.z);
         (wi.z != 0.0).then(|| BsdfSample { wi, weight: *m.view::<Rgb>(), pdf: 1.0, delta: true })

@@ -1,6 +1,6 @@
 //! The unit of work of a thread: a tile of pixels, its samples dealt out in batches of camera rays.
 
-use super::film::{FilmSample, FilmTile, REPLICATES};
+use super::film::{FilmTile, REPLICATES};
 use super::layers::Layers;
 use super::settings::RenderSettings;
 use crate::base::camera::FilmSamples;
@@ -45,7 +45,6 @@ pub struct Worker {
     pub film: FilmTile,
     /// The tile's further layers.
     pub layers: Layers,
-    samples: Vec<FilmSample>,
     runs: Vec<Run>,
     film_x: Vec<f32>,
     film_y: Vec<f32>,
@@ -82,7 +81,6 @@ impl Worker {
         Worker {
             film: FilmTile::new(PixelRect::default()),
             layers: Layers::new(PixelRect::default(), &settings.aovs),
-            samples: Vec::new(),
             runs: Vec::new(),
             film_x: Vec::new(),
             film_y: Vec::new(),
@@ -185,22 +183,11 @@ impl Worker {
     /// Adds a run's results to the tile.
     fn collect(&mut self, run: &Run, job: &Job) {
         let range = run.start..run.start + run.len;
-        self.samples.clear();
-        for (i, (&radiance, &alpha)) in
-            self.results.li[range.clone()].iter().zip(&self.results.alpha[range.clone()]).enumerate()
-        {
-            // No number aborts a render: what is not finite is left out, counted and reported.
-            if radiance.is_finite() {
-                self.samples.push(FilmSample { radiance, alpha });
-            } else {
-                self.film.drop_sample();
-                if self.bad.len() < 8 {
-                    let index = run.first_index + i as u32;
-                    self.bad.push(BadSample { x: run.x, y: run.y, replicate: run.replicate, index });
-                }
-            }
+        let (li, alpha) = (&self.results.li[range.clone()], &self.results.alpha[range.clone()]);
+        let bad = self.film.add_run(run.x, run.y, run.replicate as usize, li, alpha);
+        if bad > 0 {
+            self.report_bad(run);
         }
-        self.film.add_run(run.x, run.y, run.replicate as usize, &self.samples);
         if self.batch.want_first {
             let starts_pixel = run.replicate == 0 && run.first_index == 0;
             for (i, hit) in self.results.first[range].iter().enumerate() {
@@ -208,6 +195,16 @@ impl Worker {
                     self.layers.add(run.x, run.y, hit, starts_pixel && i == 0, job.scene);
                 }
             }
+        }
+    }
+
+    /// Keeps which samples of a run are not finite, the first few: no number aborts a render.
+    #[cold]
+    fn report_bad(&mut self, run: &Run) {
+        let li = &self.results.li[run.start..run.start + run.len];
+        let bad = (run.first_index..).zip(li).filter(|(_, radiance)| !radiance.is_finite());
+        for (index, _) in bad.take(8usize.saturating_sub(self.bad.len())) {
+            self.bad.push(BadSample { x: run.x, y: run.y, replicate: run.replicate, index });
         }
     }
 }

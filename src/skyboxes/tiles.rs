@@ -59,7 +59,7 @@ pub(super) struct Footprint {
 }
 
 /// Lookups that are worked on at once: their footprints stay in the first-level cache.
-pub(super) const CHUNK: usize = 256;
+pub(super) const CHUNK: usize = 128;
 
 /// Up to [`CHUNK`] footprints as columns.
 pub(super) struct Footprints {
@@ -116,6 +116,9 @@ impl Strides {
 /// How a stored texel is read.
 trait Texel: Copy {
     fn rgb(self, curve: &[f32; 256]) -> Rgb;
+
+    /// Something of it, so that it is loaded.
+    fn bits(self) -> u32;
 }
 
 impl Texel for [u8; 4] {
@@ -123,12 +126,22 @@ impl Texel for [u8; 4] {
     fn rgb(self, curve: &[f32; 256]) -> Rgb {
         Rgb::new(curve[self[0] as usize], curve[self[1] as usize], curve[self[2] as usize])
     }
+
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        u32::from_ne_bytes(self)
+    }
 }
 
 impl Texel for [f32; 3] {
     #[inline(always)]
     fn rgb(self, _: &[f32; 256]) -> Rgb {
         Rgb::from(self)
+    }
+
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        self[0].to_bits()
     }
 }
 
@@ -249,7 +262,12 @@ fn mixed<T: Texel>(texels: &[T], curve: &[f32; 256], f: Footprint) -> Rgb {
 
 #[inline(always)]
 fn mix_slice<T: Texel>(texels: &[T], curve: &[f32; 256], footprints: &Footprints, out: &mut [Rgb]) {
-    for (i, out) in out.iter_mut().take(CHUNK).enumerate() {
+    let n = out.len().min(CHUNK);
+    // So few instructions a lookup that a processor has dozens of them on their way; the mixing below finds what it needs
+    // in a cache. Worth a sixth of a lookup's time even so where they all are in a cache already.
+    let touched = (0..n).fold(0, |all, i| all | texels[footprints.at[i] as usize].bits());
+    std::hint::black_box(touched);
+    for (i, out) in out[..n].iter_mut().enumerate() {
         *out = mixed(texels, curve, footprints.get(i));
     }
 }

@@ -72,7 +72,11 @@ fn a_run_is_its_samples() {
     let samples: Vec<FilmSample> = (0..600_000).map(|_| sample(rng.f32() * 6e5)).collect();
     let (mut one, mut run) = (FilmTile::new(rect), FilmTile::new(rect));
     samples.iter().for_each(|&s| one.add(3, 4, 1, s));
-    samples.chunks(400_000).for_each(|s| run.add_run(3, 4, 1, s));
+    for s in samples.chunks(400_000) {
+        let li: Vec<Rgb> = s.iter().map(|s| s.radiance).collect();
+        let alpha: Vec<f32> = s.iter().map(|s| s.alpha).collect();
+        assert_eq!(run.add_run(3, 4, 1, &li, &alpha), 0);
+    }
     let (mut a, mut b) = (Film::new(16, 16, rect), Film::new(16, 16, rect));
     a.add_tile(&one);
     b.add_tile(&run);

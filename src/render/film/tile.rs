@@ -131,25 +131,31 @@ impl FilmTile {
         self.count(at, replicate, 1);
     }
 
-    /// Adds samples of one pixel and one replicate, as [`FilmTile::add`] for each, but summed in registers.
+    /// Adds samples of one pixel and one replicate, as [`FilmTile::add`] for each, but summed in registers. Those that
+    /// are not finite are left out, counted as dropped, and their number is returned. Both slices are of one length.
     #[inline]
-    pub fn add_run(&mut self, x: u32, y: u32, replicate: usize, samples: &[FilmSample]) {
+    pub fn add_run(&mut self, x: u32, y: u32, replicate: usize, li: &[Rgb], alpha: &[f32]) -> usize {
         let at = self.index(x, y);
-        for run in samples.chunks(FLUSH_AFTER) {
-            if self.pending + run.len() > FLUSH_AFTER {
+        let mut dropped = 0;
+        for (li, alpha) in li.chunks(FLUSH_AFTER).zip(alpha.chunks(FLUSH_AFTER)) {
+            if self.pending + li.len() > FLUSH_AFTER {
                 self.flush();
             }
-            let mut sum = [0; 4];
-            for sample in run {
-                debug_assert!(sample.is_finite(), "non-finite sample at ({x}, {y})");
+            let (mut sum, mut left_out) = ([0; 4], 0);
+            for (&radiance, &alpha) in li.iter().zip(alpha) {
+                let sample = FilmSample { radiance, alpha };
                 match quantise_small(sample.to_array()) {
                     Some(steps) => accumulate(&mut sum, steps),
-                    None => self.add_large(at, replicate, sample),
+                    None if sample.is_finite() => self.add_large(at, replicate, &sample),
+                    None => left_out += 1,
                 }
             }
             self.add_steps(at, replicate, sum);
-            self.count(at, replicate, run.len());
+            self.count(at, replicate, li.len() - left_out);
+            dropped += left_out;
         }
+        self.dropped += dropped as u64;
+        dropped
     }
 
     /// Counts a sample that is left out because it is not finite.
