@@ -108,7 +108,7 @@ impl Night {
             white: Rgb::splat(1.0),
             disc: false,
         });
-        // The Milky Way as in a long exposure: four times the air below it, a quarter of a plate in moonlight.
+        // The Milky Way as in a long exposure: several times the air before it, and still dimmer than what the moon lights.
         let band = Band { seed: self.seed, scale: 0.11 * self.scale };
         let tint = Rgb::new(0.62, 0.8, 1.25);
         let airglow = Rgb::new(0.0040, 0.0062, 0.0090) * self.scale;

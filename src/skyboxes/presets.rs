@@ -2,8 +2,8 @@
 //!
 //! Each is exposed as a photographer would: by the brightest channel of a white Lambertian plate turned to where it gets
 //! most light, for a coloured light clips in that channel first. It is about 1.1 by day, so that an object of albedo 0.8
-//! just stays below 1; 0.5 to 0.8 by night, which is to look like one; and 0.3 at dusk, whose horizon is ten times as
-//! bright as what it lights. Colours are those of a camera set to daylight, whose white is sunlight with some sky.
+//! just stays below 1; 0.5 to 0.8 by night, which is to look like one; and 0.3 at dusk, whose horizon is several times
+//! as bright as what it lights. Colours are those of a camera set to daylight, whose white is sunlight with some sky.
 
 use crate::base::registry::{Node, Params, Value};
 
@@ -39,7 +39,8 @@ static PRESETS: &[Preset] = &[
         numbers: &[
             ("sun_elevation_deg", 3.5),
             ("sun_azimuth_deg", 20.0),
-            // Little haze: with 2 the glow about the sun is half of the light, and white over a quarter of the sky.
+            // Little haze: with 2 the sky gives two fifths of a plate's light instead of a quarter, most of it from a
+            // glow about the sun that is white.
             ("turbidity", 1.5),
             ("white_k", 5800.0),
             ("scale", 3.7),
