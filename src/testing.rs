@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 use glam::{DVec3, Vec2, Vec3};
 
-pub use chi_square::{Bins, ChiSquare, chi_square_sphere};
+pub use chi_square::{Bins, ChiSquare, chi_square_counts, chi_square_sphere};
 pub use quadrature::{integrate_rect, integrate_sphere};
 
 use crate::sampler::hash::mix64;

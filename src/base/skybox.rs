@@ -71,7 +71,10 @@ pub trait Skybox: Send + Sync {
     /// row by row (the row of v = 0 first), chart by chart. Not zero wherever the radiance is not. By quadrature
     /// unless a sky knows better.
     fn cell_integrals(&self, grid: ChartGrid) -> Vec<f64> {
-        integrate_cells(grid, |c| {
+        // However coarse the grid, the natural one is what resolves the radiance.
+        let natural = self.grid();
+        let parts = [natural.width.div_ceil(grid.width), natural.height.div_ceil(grid.height)];
+        integrate_parts(grid, parts, |c| {
             let l = self.radiance(self.direction(c).as_vec3()).luminance();
             f64::from(l) * self.solid_angle_density(c)
         })
@@ -110,6 +113,21 @@ impl ChartGrid {
 /// as bilinear filters of the cell's own width do, is met to fourth order.
 const ABSCISSAS: [f64; 4] =
     [0.105_662_432_702_593_56, 0.394_337_567_297_406_44, 0.605_662_432_702_593_6, 0.894_337_567_297_406_4];
+
+/// As [`integrate_cells`], with each cell cut into `parts` across and along, of at least 1.
+fn integrate_parts(grid: ChartGrid, parts: [u32; 2], f: impl Fn(ChartPoint) -> f64 + Sync) -> Vec<f64> {
+    let [across, along] = parts.map(|n| n as usize);
+    let (width, height) = (grid.width * parts[0], grid.height * parts[1]);
+    let fine = integrate_cells(ChartGrid { width, height, ..grid }, f);
+    let w = grid.width as usize;
+    // Rows of all charts follow one another, and so do those of the parts.
+    let cell = |i: usize| {
+        let start = i / w * along * w * across + i % w * across;
+        let row = |k: usize| fine[start + k * w * across..][..across].iter().sum::<f64>();
+        (0..along).map(row).sum()
+    };
+    (0..grid.cells()).map(cell).collect()
+}
 
 /// Integrals of `f` over each cell of `grid`, row by row, chart by chart: 16 points a cell, in parallel.
 pub fn integrate_cells(grid: ChartGrid, f: impl Fn(ChartPoint) -> f64 + Sync) -> Vec<f64> {

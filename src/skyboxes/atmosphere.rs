@@ -26,11 +26,11 @@ const HAZE_ALBEDO: f32 = 0.95;
 /// Angular radius of the sun seen from the Earth, on average.
 pub(super) const SUN_HALF_ANGLE: f64 = 0.2666 * PI / 180.0;
 
-/// The table of columns to the top: by the square root of the height, and by the distance to the top between the
-/// shortest and the longest there, which never looks below the horizon (Bruneton and Neyret, "Precomputed Atmospheric
-/// Scattering", 2008, section 4).
-const COLUMN_HEIGHTS: usize = 32;
-const COLUMN_ANGLES: usize = 48;
+/// The table of air masses of rising rays: by the square root of the height, and by the distance to the top between that
+/// straight up and that of a level ray, in which a mass is almost linear (after Bruneton and Neyret, "Precomputed
+/// Atmospheric Scattering", 2008, section 4).
+const MASS_HEIGHTS: usize = 32;
+const MASS_ANGLES: usize = 48;
 /// The table of multiple scattering: by the square root of the height and by the sun's elevation about that at the
 /// observer.
 const MULTIPLE_HEIGHTS: usize = 8;
@@ -57,6 +57,34 @@ impl Columns {
         }
     }
 
+    /// Columns straight up from a height: the integrals of [`Columns::at_height`].
+    #[inline(always)]
+    fn above(h: f64) -> Self {
+        let air = Columns::at_height(h);
+        let (foot, head) = (OZONE_CENTER - OZONE_HALF_WIDTH, OZONE_CENTER + OZONE_HALF_WIDTH);
+        // The tent's area: that of its upper half less what has been passed of it, or the corner that is left.
+        let corner = |w: f64| 0.5 * w * w / OZONE_HALF_WIDTH;
+        let ozone = if h < OZONE_CENTER {
+            OZONE_HALF_WIDTH - corner((h - foot).max(0.0))
+        } else {
+            corner((head - h).max(0.0))
+        };
+        Columns {
+            rayleigh: air.rayleigh * RAYLEIGH_HEIGHT as f32,
+            haze: air.haze * HAZE_HEIGHT as f32,
+            ozone: ozone as f32,
+        }
+    }
+
+    #[inline(always)]
+    fn zip(self, o: Columns, f: impl Fn(f32, f32) -> f32) -> Self {
+        Columns {
+            rayleigh: f(self.rayleigh, o.rayleigh),
+            haze: f(self.haze, o.haze),
+            ozone: f(self.ozone, o.ozone),
+        }
+    }
+
     /// `self + o * scale`.
     #[inline(always)]
     fn plus(self, o: Columns, scale: f32) -> Self {
@@ -76,7 +104,8 @@ pub(super) struct Atmosphere {
     ozone: Spectrum,
     ground_albedo: Spectrum,
     to_sun: DVec3,
-    columns: Vec<Columns>,
+    /// Columns along rising rays over those straight up.
+    masses: Vec<Columns>,
     /// Radiance of light scattered at least once, averaged over directions.
     multiple: Vec<Spectrum>,
 }
@@ -141,7 +170,7 @@ impl Atmosphere {
             ozone: per_km(spectrum::ozone_depth(), OZONE_HALF_WIDTH),
             ground_albedo,
             to_sun,
-            columns: column_table(),
+            masses: mass_table(),
             multiple: Vec::new(),
         };
         let cells = 0..MULTIPLE_HEIGHTS * MULTIPLE_ANGLES;
@@ -185,19 +214,35 @@ impl Atmosphere {
         (visible > 0.0).then(|| (self.columns_at(r, mu.max(horizon)), visible))
     }
 
+    /// Columns from radius `r` to the top at the cosine `mu`, not below the horizon.
     #[inline(always)]
     fn columns_at(&self, r: f64, mu: f64) -> Columns {
-        let x = ((r - GROUND) / (TOP - GROUND)).clamp(0.0, 1.0).sqrt();
-        let (nearest, farthest) = column_range(r);
+        if mu >= 0.0 {
+            return self.rising_at(r, mu);
+        }
+        // Down to the lowest point and up again, less what lies behind.
+        let lowest = (r * (1.0 - mu * mu).max(0.0).sqrt()).max(GROUND);
+        let behind = self.rising_at(r, -mu);
+        self.rising_at(lowest, 0.0).zip(behind, |whole, behind| (2.0 * whole - behind).max(0.0))
+    }
+
+    /// As [`Atmosphere::columns_at`] for `mu` of at least 0. Columns themselves fall by 1/e within an interval of the
+    /// table or end in the middle of it, as ozone does; their ratios to those straight up do not.
+    #[inline(always)]
+    fn rising_at(&self, r: f64, mu: f64) -> Columns {
+        let height = (r - GROUND).max(0.0);
+        let x = (height / (TOP - GROUND)).min(1.0).sqrt();
+        let (nearest, farthest) = mass_range(r);
         let y = (to_top(r, mu) - nearest) / (farthest - nearest).max(1e-9);
-        let (i, fx) = cell(x, COLUMN_HEIGHTS);
-        let (j, fy) = cell(y, COLUMN_ANGLES);
-        let at = |i: usize, j: usize| self.columns[i * COLUMN_ANGLES + j];
-        Columns::default()
+        let (i, fx) = cell(x, MASS_HEIGHTS);
+        let (j, fy) = cell(y, MASS_ANGLES);
+        let at = |i: usize, j: usize| self.masses[i * MASS_ANGLES + j];
+        let mass = Columns::default()
             .plus(at(i, j), (1.0 - fx) * (1.0 - fy))
             .plus(at(i, j + 1), (1.0 - fx) * fy)
             .plus(at(i + 1, j), fx * (1.0 - fy))
-            .plus(at(i + 1, j + 1), fx * fy)
+            .plus(at(i + 1, j + 1), fx * fy);
+        mass.zip(Columns::above(height), |mass, above| mass * above)
     }
 
     #[inline(always)]
@@ -288,10 +333,9 @@ impl Atmosphere {
     }
 }
 
-/// Shortest and longest distance from radius `r` to the top without meeting the ground.
-fn column_range(r: f64) -> (f64, f64) {
-    let to_horizon = (r * r - GROUND * GROUND).max(0.0).sqrt();
-    (TOP - r, to_horizon + (TOP * TOP - GROUND * GROUND).sqrt())
+/// Distance from radius `r` to the top straight up, and along a level ray.
+fn mass_range(r: f64) -> (f64, f64) {
+    (TOP - r, to_top(r, 0.0))
 }
 
 /// The cell of `x` in [0, 1] (clamped) between `n` values, and the place in it.
@@ -302,24 +346,29 @@ fn cell(x: f64, n: usize) -> (usize, f32) {
     (i, (x - i as f64) as f32)
 }
 
-fn column_table() -> Vec<Columns> {
+fn mass_table() -> Vec<Columns> {
     let of = |k: usize| {
-        let x = (k / COLUMN_ANGLES) as f64 / (COLUMN_HEIGHTS - 1) as f64;
-        let r = GROUND + (TOP - GROUND) * x * x;
-        let (nearest, farthest) = column_range(r);
-        let d = nearest + (farthest - nearest) * (k % COLUMN_ANGLES) as f64 / (COLUMN_ANGLES - 1) as f64;
-        if d <= 0.0 {
-            return Columns::default();
-        }
-        let mu = (TOP * TOP - r * r - d * d) / (2.0 * r * d);
-        let mu = mu.clamp(horizon(r), 1.0);
-        if mu >= 0.0 {
-            return rising(r, mu);
-        }
-        // Down to the lowest point and up again, less what lies behind.
-        Columns::default().plus(rising(r * (1.0 - mu * mu).sqrt(), 0.0), 2.0).plus(rising(r, -mu), -1.0)
+        let x = (k / MASS_ANGLES) as f64 / (MASS_HEIGHTS - 1) as f64;
+        let y = (k % MASS_ANGLES) as f64 / (MASS_ANGLES - 1) as f64;
+        let height = (TOP - GROUND) * x * x;
+        let mut mass = mass(height, y);
+        // There is no ozone above its layer whose mass could be told, only below, where the next interval ends.
+        mass.ozone = self::mass(height.min(OZONE_CENTER + OZONE_HALF_WIDTH - 1.0), y).ozone;
+        mass
     };
-    (0..COLUMN_HEIGHTS * COLUMN_ANGLES).into_par_iter().with_min_len(64).map(of).collect()
+    (0..MASS_HEIGHTS * MASS_ANGLES).into_par_iter().with_min_len(64).map(of).collect()
+}
+
+/// Columns from a height, over those straight up, to the part `y` of the way from the nearest to the farthest point of
+/// the top.
+fn mass(height: f64, y: f64) -> Columns {
+    let r = GROUND + height;
+    let (nearest, farthest) = mass_range(r);
+    let d = nearest + (farthest - nearest) * y;
+    // At the very top no air is left.
+    let mu = if d > 0.0 { (TOP * TOP - r * r - d * d) / (2.0 * r * d) } else { 1.0 };
+    let ratio = |column: f32, above: f32| if above > 0.0 { column / above } else { 0.0 };
+    rising(r, mu.clamp(0.0, 1.0)).zip(Columns::above(height), ratio)
 }
 
 /// Columns to the top along a ray that only rises, so that the air is densest at its start.

@@ -131,6 +131,10 @@ fn splat(f: usize, face: &mut [[f32; 3]], size: usize, spot: &Spot) {
     for y in range(-t) {
         for x in range(s) {
             let apart = (centre(f, size, x, y) - spot.toward).length_squared();
+            // Beyond four sigma lies 3e-4 of a spot, and where exponentials underflow they are slow.
+            if apart > 16.0 * sigma * sigma {
+                continue;
+            }
             let c = peak * (-0.5 * apart / (sigma * sigma)).exp();
             for (v, c) in face[y * size + x].iter_mut().zip(c.to_array()) {
                 *v += c;

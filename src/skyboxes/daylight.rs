@@ -38,6 +38,8 @@ pub(super) struct Weather {
     pub altitude_km: f64,
     /// Radiance of a white plate that faces the sun above the atmosphere.
     pub scale: f32,
+    /// What each channel is multiplied by: [`spectrum::white_balance`].
+    pub white: Rgb,
     /// Whether the sun itself is seen.
     pub disc: bool,
 }
@@ -84,23 +86,16 @@ fn haze_phase(mu: f32) -> f32 {
     NORM * (1.0 + mu * mu) / (x * x.sqrt())
 }
 
-/// Place on the axis of elevations, 0 at the horizon to 1 straight up, of the height `y` in [0, 1] of a unit vector:
-/// the square root of about the elevation, because a sky changes fastest next to the horizon. The inner polynomial is
-/// that of acos(y) / sqrt(1 - y) (Abramowitz and Stegun, 4.4.45) over its value at 0, so that the ends are exact.
+/// Place on the axis of elevations, 0 at the horizon to 1 straight up or down, of an angle to the horizon in [0, pi/2]:
+/// its square root, because a sky changes fastest next to the horizon.
 #[inline(always)]
-fn warp(y: f32) -> f32 {
-    let p = 1.0 + y * (-0.135_042 + y * (0.047_278_1 + y * -0.011_923_9));
-    (1.0 - (1.0 - y).max(0.0).sqrt() * p).max(0.0).sqrt()
+fn warp(elevation: f32) -> f32 {
+    (elevation * std::f32::consts::FRAC_2_PI).max(0.0).sqrt().min(1.0)
 }
 
-/// The height at a place: inverse of [`warp`], by bisection.
+/// The elevation at a place, radians: inverse of [`warp`].
 fn unwarp(w: f64) -> f64 {
-    let (mut lo, mut hi) = (0.0, 1.0);
-    for _ in 0..40 {
-        let mid = 0.5 * (lo + hi);
-        if f64::from(warp(mid as f32)) < w { lo = mid } else { hi = mid }
-    }
-    0.5 * (lo + hi)
+    w * w * FRAC_PI_2
 }
 
 impl Daylight {
@@ -136,7 +131,7 @@ fn disc(w: &Weather, air: &Atmosphere) -> Option<SkyDisc> {
     let [r, g, b] = spectrum::sunlit_rgb(&air.sunlight(w.altitude_km)).map(|c| c.max(0.0));
     let mut disc = SkyDisc { toward: w.to_sun, half_angle: SUN_HALF_ANGLE, radiance: Rgb::new(r, g, b) };
     // Irradiance over solid angle; a white plate of radiance 1 is given pi.
-    disc.radiance = disc.radiance * ((PI / disc.solid_angle()) as f32 * w.scale);
+    disc.radiance = disc.radiance * w.white * ((PI / disc.solid_angle()) as f32 * w.scale);
     (w.disc && !disc.radiance.is_black()).then_some(disc)
 }
 
@@ -155,7 +150,7 @@ impl Rays<'_> {
         rays.into_par_iter()
             .with_min_len(8)
             .map(|k| {
-                let elevation = sign * unwarp((k / AZIMUTHS) as f64 / (ROWS - 1) as f64).asin();
+                let elevation = sign * unwarp((k / AZIMUTHS) as f64 / (ROWS - 1) as f64);
                 // The true horizon lies a little lower for an observer above the ground. It is moved up to y = 0,
                 // and what is above and below it with it, less and less towards the zenith and nadir.
                 let seen = elevation + (dip + sign * 1e-4) * (1.0 - elevation.abs() / FRAC_PI_2);
@@ -176,7 +171,7 @@ fn direction(azimuth: DVec3, elevation: f64, along: f64) -> DVec3 {
 fn irradiance(rays: &[Arriving], to_sun: DVec3, azimuth: DVec3) -> Spectrum {
     let mut sum = [0.0; LANES];
     for row in 1..ROWS {
-        let height = |r: usize| unwarp(r as f64 / (ROWS - 1) as f64);
+        let height = |r: usize| unwarp(r as f64 / (ROWS - 1) as f64).sin();
         let (y0, y) = (height(row - 1), height(row));
         for k in 0..AZIMUTHS {
             let along = k as f64 / (AZIMUTHS - 1) as f64 * PI;
@@ -196,12 +191,11 @@ fn irradiance(rays: &[Arriving], to_sun: DVec3, azimuth: DVec3) -> Spectrum {
 
 impl Half {
     fn new(rays: &[Arriving], sign: f64, w: &Weather) -> Self {
-        let scale = w.scale * std::f32::consts::PI;
-        let rgb = |s: &Spectrum| Vec3::from(spectrum::sunlit_rgb(s)).extend(0.0) * scale;
+        let scale = Vec3::from(w.white.to_array()) * (w.scale * std::f32::consts::PI);
+        let rgb = |s: &Spectrum| (Vec3::from(spectrum::sunlit_rgb(s)) * scale).extend(0.0);
         let horizontal = (1.0 - w.to_sun.y * w.to_sun.y).max(0.0).sqrt();
         let nodes = (0..ROWS).flat_map(|row| {
-            let y = unwarp(row as f64 / (ROWS - 1) as f64);
-            let r = (1.0 - y * y).sqrt();
+            let (y, r) = unwarp(row as f64 / (ROWS - 1) as f64).sin_cos();
             // What does not depend on the angle to the sun is divided by the phase function it will meet.
             let seen: Vec<Node> = (0..AZIMUTHS)
                 .map(|k| {
@@ -241,8 +235,9 @@ impl Scattered {
     /// Radiance towards a unit direction.
     fn radiance(&self, d: Vec3) -> Rgb {
         let half = if d.y >= 0.0 { &self.up } else { &self.down };
-        let row = warp(d.y.abs()) * (ROWS - 1) as f32;
         let flat = (d.x * d.x + d.z * d.z).max(1e-30).sqrt();
+        // By both sides of the triangle: next to the zenith the height alone has lost half of the digits.
+        let row = warp(d.y.abs().atan2(flat)) * (ROWS - 1) as f32;
         let along = (d.x * self.azimuth.x + d.z * self.azimuth.z) / flat;
         let column = (0.5 + 0.5 * along.clamp(-1.0, 1.0)) * (COLUMNS - 1) as f32;
         let (i, j) = ((row as usize).min(ROWS - 2), (column as usize).min(COLUMNS - 2));
@@ -305,6 +300,12 @@ pub const ROW: Row<dyn Skybox> = Row {
             "1.0",
             "radiance of a white plate that faces the sun above the atmosphere",
         ),
+        number(
+            "white_k",
+            (4000.0, 25000.0),
+            "6504",
+            "colour temperature of the daylight that is shown as white, kelvin; 6504 leaves radiance as it is",
+        ),
         ParamSpec {
             name: "ground_albedo",
             kind: ParamKind::Color,
@@ -337,6 +338,7 @@ fn weather(p: &Params) -> Result<Weather> {
         ground_albedo: p.color_or("ground_albedo", [0.18, 0.17, 0.16])?,
         altitude_km: p.number_or("altitude_km", 0.3)?.clamp(0.0, 10.0),
         scale: p.number_or("scale", 1.0)?.clamp(0.0, 1e9) as f32,
+        white: spectrum::white_balance(p.number_or("white_k", 6504.0)?.clamp(4000.0, 25000.0)),
         disc: p.bool_or("sun", true)?,
     })
 }

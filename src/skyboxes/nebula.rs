@@ -65,7 +65,7 @@ pub const ROW: Row<dyn Skybox> = Row {
         number("scale", (0.0, 1e9), "1.0", "scales all of its radiance"),
         number("star_elevation_deg", (-90.0, 90.0), "35.0", "height of the near star"),
         number("star_azimuth_deg", (-360.0, 360.0), "60.0", "from +x towards +z"),
-        number("star_irradiance", (0.0, 1e9), "1.4", "irradiance of a surface that faces the near star"),
+        number("star_irradiance", (0.0, 1e9), "1.8", "irradiance of a surface that faces the near star"),
     ],
     build,
     samples: || {
@@ -82,7 +82,7 @@ fn build(p: &Params) -> Result<Arc<dyn Skybox>> {
     let seed = p.number_or("seed", 1.0)?.clamp(0.0, 1e6) as u32;
     let scale = p.number_or("scale", 1.0)?.clamp(0.0, 1e9) as f32;
     let toward = super::toward(p, ["star_elevation_deg", "star_azimuth_deg"], [35.0, 60.0])?;
-    let irradiance = p.number_or("star_irradiance", 1.4)?.clamp(0.0, 1e9) as f32 * scale;
+    let irradiance = p.number_or("star_irradiance", 1.8)?.clamp(0.0, 1e9) as f32 * scale;
     // Clouds are soft: half the texels show all of them.
     let mut canvas = Canvas::painted(size.div_ceil(2).max(16), &Clouds { seed, scale }).finer(size, |_, c| c);
     let colour = Rgb::new(0.92, 0.97, 1.0);
@@ -112,7 +112,7 @@ fn stars(seed: u32, scale: f32) -> Vec<Spot> {
     (0..16_000)
         .map(|_| {
             let toward = random.direction();
-            star(&mut random, toward, 6e-8 * scale)
+            star(&mut random, toward, 1.1e-7 * scale)
         })
         .collect()
 }

@@ -11,9 +11,11 @@ use crate::math::trig;
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
-/// The pole of the Milky Way's plane and its brightest part, towards the galactic centre; an arch across the sky.
-const POLE: Vec3 = Vec3::new(0.48, 0.36, -0.8);
-const CENTRE: Vec3 = Vec3::new(0.8, 0.36, 0.48);
+/// The pole of the Milky Way's plane and its brightest part, towards the galactic centre: an arch that leans across the
+/// sky, 20 degrees up where it is brightest, and as far from where the moon stands by default as it can be, so that a
+/// camera that has the moon over its shoulder sees it.
+const POLE: Vec3 = Vec3::new(0.659, 0.539, 0.524);
+const CENTRE: Vec3 = Vec3::new(0.397, 0.342, -0.852);
 
 /// The band of the Milky Way.
 struct Band {
@@ -74,7 +76,7 @@ pub const ROW: Row<dyn Skybox> = Row {
         number("moon_elevation_deg", (-18.0, 90.0), "38.0", "height of the moon"),
         number("moon_azimuth_deg", (-360.0, 360.0), "60.0", "from +x towards +z"),
         number("moon_half_angle_deg", (0.05, 5.0), "0.5", "half of its width; 0.26 in nature"),
-        number("moon_irradiance", (0.0, 1e9), "1.2", "irradiance of a surface that faces the moon"),
+        number("moon_irradiance", (0.0, 1e9), "1.7", "irradiance of a surface that faces the moon"),
     ],
     build: |p| {
         let night = Night {
@@ -83,7 +85,7 @@ pub const ROW: Row<dyn Skybox> = Row {
             scale: p.number_or("scale", 1.0)?.clamp(0.0, 1e9) as f32,
             toward_moon: super::toward(p, ["moon_elevation_deg", "moon_azimuth_deg"], [38.0, 60.0])?,
             moon_half_angle: p.number_or("moon_half_angle_deg", 0.5)?.clamp(0.05, 5.0).to_radians(),
-            moon_irradiance: p.number_or("moon_irradiance", 1.2)?.clamp(0.0, 1e9) as f32,
+            moon_irradiance: p.number_or("moon_irradiance", 1.7)?.clamp(0.0, 1e9) as f32,
         };
         Ok(Arc::new(night.paint()))
     },
@@ -99,12 +101,15 @@ impl Night {
         let air = Daylight::new(&Weather {
             to_sun: self.toward_moon,
             turbidity: 1.6,
-            ground_albedo: Rgb::splat(0.12),
+            // Woods: the horizon is to stand out from what is below it.
+            ground_albedo: Rgb::splat(0.06),
             altitude_km: 0.3,
             scale: 0.16 * self.scale,
+            white: Rgb::splat(1.0),
             disc: false,
         });
-        let band = Band { seed: self.seed, scale: 0.05 * self.scale };
+        // The Milky Way as in a long exposure: several times the air before it, and still dimmer than what the moon lights.
+        let band = Band { seed: self.seed, scale: 0.11 * self.scale };
         let tint = Rgb::new(0.62, 0.8, 1.25);
         let airglow = Rgb::new(0.0040, 0.0062, 0.0090) * self.scale;
         let mut canvas = Canvas::painted(self.size.div_ceil(2).max(16), &band).finer(self.size, |d, band| {
@@ -115,7 +120,9 @@ impl Night {
         let mut discs = Vec::new();
         let irradiance = self.moon_irradiance * self.scale;
         if irradiance > 0.0 && self.toward_moon.y > 0.0 {
-            let colour = Rgb::new(1.0, 0.97, 0.9);
+            // Sunlight reflected by dust is warmer than daylight. The eye, which sees blue better in the dark, and film
+            // by custom call it cool.
+            let colour = Rgb::new(0.80, 0.88, 1.0);
             let mut disc =
                 SkyDisc { toward: self.toward_moon, half_angle: self.moon_half_angle, radiance: colour };
             disc.radiance = colour * (irradiance / disc.solid_angle() as f32);
@@ -137,14 +144,14 @@ impl Night {
 
     fn stars(&self) -> Vec<Spot> {
         let mut random = Stream::new(u64::from(self.seed) ^ 0x0057_a25e);
-        (0..14_000)
+        (0..20_000)
             .filter_map(|_| {
                 let mut toward = random.direction();
                 // A third of them gather in the Milky Way.
                 if random.next() < 0.33 {
                     toward = (toward - POLE * (0.75 * toward.dot(POLE))).normalize();
                 }
-                let s = star(&mut random, toward, 5e-8 * self.scale);
+                let s = star(&mut random, toward, 1.2e-7 * self.scale);
                 // Air dims what is low.
                 let seen = smoothstep(0.0, 0.3, toward.y);
                 (seen > 0.0).then_some(Spot { flux: s.flux * seen, ..s })

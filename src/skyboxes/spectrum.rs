@@ -75,13 +75,36 @@ pub(super) fn sunlit_rgb(s: &Spectrum) -> [f32; 3] {
     rgb
 }
 
+/// Chromaticity of daylight of a correlated colour temperature of 4000 to 25000 K (CIE 15:2004, 3.1), as linear Rec. 709
+/// of luminance 1.
+fn daylight_rgb(kelvin: f64) -> [f64; 3] {
+    let t = 1000.0 / kelvin;
+    let [a, b, c, d] = if kelvin <= 7000.0 {
+        [-4.6070, 2.9678, 0.09911, 0.244063]
+    } else {
+        [-2.0064, 1.9018, 0.24748, 0.237040]
+    };
+    let x = ((a * t + b) * t + c) * t + d;
+    let y = (-3.0 * x + 2.870) * x - 0.275;
+    let xyz = [x / y, 1.0, (1.0 - x - y) / y];
+    XYZ_TO_RGB.map(|row| row[0] * xyz[0] + row[1] * xyz[1] + row[2] * xyz[2])
+}
+
+/// What each channel is multiplied by so that daylight of this temperature is white, as a camera set to it shows it. One
+/// for 6504 K, the white of Rec. 709; luminances of that white are kept.
+pub(super) fn white_balance(kelvin: f64) -> Rgb {
+    let (white, wanted) = (daylight_rgb(6504.0), daylight_rgb(kelvin));
+    Rgb::from(std::array::from_fn(|i| (white[i] / wanted[i]) as f32))
+}
+
+/// XYZ to linear Rec. 709 with white D65 (ITU-R BT.709-6; IEC 61966-2-1).
+const XYZ_TO_RGB: [[f64; 3]; 3] =
+    [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]];
+
 static WEIGHTS: LazyLock<[[f32; 3]; LANES]> = LazyLock::new(|| {
     let xyz: [[f64; 3]; LANES] = std::array::from_fn(|i| observer(wavelength(i)).map(|c| c * SUN[i]));
     let y: f64 = xyz.iter().map(|c| c[1]).sum();
-    // XYZ to linear Rec. 709 with white D65 (ITU-R BT.709-6; IEC 61966-2-1).
-    const M: [[f64; 3]; 3] =
-        [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]];
-    xyz.map(|c| M.map(|row| ((row[0] * c[0] + row[1] * c[1] + row[2] * c[2]) / y) as f32))
+    xyz.map(|c| XYZ_TO_RGB.map(|row| ((row[0] * c[0] + row[1] * c[1] + row[2] * c[2]) / y) as f32))
 });
 
 /// The CIE 1931 observer, by the sums of lobes of Wyman, Sloan and Shirley, "Simple Analytic Approximations to the CIE
@@ -130,6 +153,20 @@ mod tests {
         assert!((ozone_depth()[10] - 0.0405).abs() < 1e-3);
         let haze = haze_depth(2.0);
         assert!(haze[0] > haze[15] && (f64::from(haze[7] + haze[8]) / 2.0 - 0.0973).abs() < 1e-3);
+    }
+
+    #[test]
+    fn daylight_is_balanced_to_white() {
+        // D65 is the white of the primaries: a thousandth, the digits of the matrix and of the locus.
+        assert!(daylight_rgb(6504.0).iter().all(|c| (c - 1.0).abs() < 2e-3));
+        assert_eq!(white_balance(6504.0), Rgb::splat(1.0));
+        // A camera set to warmer light takes red from all it sees and gives blue.
+        let warm = white_balance(5000.0);
+        assert!(warm.r < 0.9 && warm.b > 1.15 && (warm.g - 1.0).abs() < 0.05, "{warm:?}");
+        // Both branches of the locus meet: to four digits, as they are given.
+        for (a, b) in daylight_rgb(7000.0).iter().zip(daylight_rgb(7000.1)) {
+            assert!((a - b).abs() < 2e-3);
+        }
     }
 
     #[test]

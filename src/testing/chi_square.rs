@@ -80,14 +80,17 @@ pub fn chi_square_sphere(
     let inside: f64 = expected.iter().sum();
     assert!(inside < n * (1.0 + 1e-3), "{what}: the density integrates to {}", inside / n);
     expected.push((n - inside).max(0.0));
-    let result = compare(&counts, &expected);
+    chi_square_counts(&format!("{what}, {rows}x{columns} bins"), how.tests, &counts, &expected);
+}
+
+/// Compares counts of samples in bins of any kind with what a density expects there; `tests` as in [`ChiSquare`]. Panics
+/// with an account of it where they disagree.
+pub fn chi_square_counts(what: &str, tests: u32, counts: &[f64], expected: &[f64]) {
     // Sidak: 1 - (1 - 0.01)^(1 / tests).
-    let level = -(0.99f64.ln() / f64::from(how.tests)).exp_m1();
-    match result {
-        Err(i) => {
-            panic!("{what}: bin {i} of {rows}x{columns}+1 drew {}, expected {:.3e}", counts[i], expected[i])
-        }
-        Ok(p) if p < level => panic!("{what}: p = {p:.3e} < {level:.3e}; {}", worst(&counts, &expected)),
+    let level = -(0.99f64.ln() / f64::from(tests)).exp_m1();
+    match compare(counts, expected) {
+        Err(i) => panic!("{what}: bin {i} drew {}, expected {:.3e}", counts[i], expected[i]),
+        Ok(p) if p < level => panic!("{what}: p = {p:.3e} < {level:.3e}; {}", worst(counts, expected)),
         Ok(_) => {}
     }
 }
