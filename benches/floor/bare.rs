@@ -27,7 +27,11 @@ pub struct Room {
 
 impl Default for Room {
     fn default() -> Self {
-        Room { t: vec![0.0; CALL], uv: [(); 2].map(|()| vec![0.0; CALL]), ids: [(); 3].map(|()| vec![0; CALL]) }
+        Room {
+            t: vec![0.0; CALL],
+            uv: [(); 2].map(|()| vec![0.0; CALL]),
+            ids: [(); 3].map(|()| vec![0; CALL]),
+        }
     }
 }
 
@@ -54,7 +58,16 @@ impl Bare {
                 let (p, i) = (positions.as_ptr().cast(), indices.as_ptr().cast());
                 let (v, n) = (RTC_BUFFER_TYPE_VERTEX, positions.len() - 1);
                 rtcSetSharedGeometryBuffer(g, v, 0, RTC_FORMAT_FLOAT3, p, 0, 12, n);
-                rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, i, 0, 12, indices.len());
+                rtcSetSharedGeometryBuffer(
+                    g,
+                    RTC_BUFFER_TYPE_INDEX,
+                    0,
+                    RTC_FORMAT_UINT3,
+                    i,
+                    0,
+                    12,
+                    indices.len(),
+                );
                 rtcCommitGeometry(g);
                 rtcAttachGeometryByID(scene, g, id as u32);
                 rtcReleaseGeometry(g);

@@ -47,7 +47,8 @@ fn options() -> Options {
     let mut o = Options { scene: default, spp: 50, threads, runs: 5 };
     let mut args = std::env::args().skip(1).filter(|a| a != "--bench");
     while let Some(a) = args.next() {
-        let mut number = || args.next().and_then(|v| v.parse().ok()).unwrap_or_else(|| panic!("{a} takes a number"));
+        let mut number =
+            || args.next().and_then(|v| v.parse().ok()).unwrap_or_else(|| panic!("{a} takes a number"));
         match a.as_str() {
             "--spp" => o.spp = number(),
             "--threads" => o.threads = number() as usize,
@@ -71,7 +72,8 @@ fn main() {
     let desc = formats::load(&o.scene).expect("the scene loads");
     let size = desc.film.size;
     let kernel = KernelOptions { threads: o.threads, ..KernelOptions::default() };
-    let mut scene = build_scene(desc, &BuildOptions { backend: "embree".into(), kernel }).expect("the scene builds");
+    let mut scene =
+        build_scene(desc, &BuildOptions { backend: "embree".into(), kernel }).expect("the scene builds");
     let bare = Bare::new(&scene);
     let (recorder, tape) = Recorder::new();
     let node = Node { kind: "direct".into(), ..Node::default() };
@@ -87,7 +89,8 @@ fn main() {
         let mut rays = [0; 2];
         for y in (0..size[1]).step_by(BAND as usize) {
             let crop = PixelRect::new(0, y, size[0], size[1].min(y + BAND));
-            let settings = RenderSettings { crop, spp: o.spp, threads: o.threads, ..RenderSettings::new(size) };
+            let settings =
+                RenderSettings { crop, spp: o.spp, threads: o.threads, ..RenderSettings::new(size) };
             let t = band(&mut scene, &integrator, settings, &recorder, &tape, &bare, &pool);
             sum.render += t.render;
             sum.kernel += t.kernel;

@@ -48,7 +48,7 @@ impl Integrator for AmbientOcclusion {
             if batch.want_first {
                 out.first[i] = Some(first_hit(scene, v));
             }
-            let id = &batch.ids[i];
+            let id = batch.ids.get(i);
             let u = id.sampler.get_2d(id.index, Dim::at(1, Slot::BsdfUv));
             let local = cosine_hemisphere(u.into());
             let side = if v.wo.dot(v.ng) >= 0.0 { 1.0 } else { -1.0 };

@@ -6,6 +6,7 @@ pub mod direct;
 mod escapes;
 pub mod normals;
 pub mod path;
+mod points;
 
 use crate::base::hit::HitBatch;
 use crate::base::ray::RayBatch;
@@ -35,11 +36,44 @@ pub struct CameraBatch {
     /// The rays, of unit direction, neighbours in the batch close together.
     pub rays: RayBatch,
     /// Their identities.
-    pub ids: Vec<PathId>,
+    pub ids: PathIds,
     /// Width of a camera ray per unit of distance.
     pub spread: f32,
     /// Whether [`PathResults::first`] is wanted.
     pub want_first: bool,
+}
+
+/// Identities as a structure of arrays, all of one length.
+#[derive(Debug, Clone, Default)]
+pub struct PathIds {
+    /// See [`PathId::sampler`].
+    pub samplers: Vec<PixelSampler>,
+    /// See [`PathId::index`].
+    pub indices: Vec<u32>,
+    /// See [`PathId::key`].
+    pub keys: Vec<u32>,
+}
+
+impl PathIds {
+    /// Identity `i`.
+    #[inline]
+    pub fn get(&self, i: usize) -> PathId {
+        PathId { sampler: self.samplers[i], index: self.indices[i], key: self.keys[i] }
+    }
+
+    /// Appends consecutive samples, `first` on.
+    pub fn extend(&mut self, first: PathId, n: usize) {
+        self.samplers.extend(std::iter::repeat_n(first.sampler, n));
+        self.indices.extend(first.index..first.index + n as u32);
+        self.keys.extend(std::iter::repeat_n(first.key, n));
+    }
+
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        self.samplers.clear();
+        self.indices.clear();
+        self.keys.clear();
+    }
 }
 
 /// The first surface of a path, from which AOVs read.

@@ -2,7 +2,9 @@
 //! multiple importance sampling (Veach 1997, ch. 9), long paths end by Russian roulette.
 
 use super::escapes::Escapes;
-use super::{CameraBatch, FirstHit, Integrator, PathId, PathResults, Workspace};
+use super::points::{VertexPoint, VertexPoints};
+use super::{CameraBatch, FirstHit, Integrator, PathId, PathIds, PathResults, Workspace};
+use crate::base::hit::{HitBatch, NO_PRIMITIVE};
 use crate::base::light::{PathEnd, Receiver};
 use crate::base::material::{Material, Prepared};
 use crate::base::ray::{Coherence, RayBatch};
@@ -89,6 +91,9 @@ pub struct PathScratch {
     next: Vec<PathState>,
     pending: Vec<Pending>,
     escapes: Escapes,
+    /// Which rays of the depth met something.
+    hits: Vec<u32>,
+    points: VertexPoints,
 }
 
 impl Integrator for PathTracer {
@@ -122,7 +127,7 @@ impl Integrator for PathTracer {
 /// What is the same for all paths of a depth.
 struct Block<'a> {
     scene: &'a Scene,
-    ids: &'a [PathId],
+    ids: &'a PathIds,
     depth: u32,
 }
 
@@ -153,11 +158,11 @@ impl PathTracer {
             // Most batches of most pictures: nothing but sky, and nothing to sort out.
             return paths.escapes.fill_background(scene, rays.directions(), &mut out.li);
         }
-        for i in 0..rays.len() {
-            let Some(hit) = work.hits.get(i) else {
-                paths.escapes.push(i as u32, rays.direction(i));
-                continue;
-            };
+        paths.sort_out(&work.hits, rays);
+        paths.draw(&block, self.light_sampling, |_, i| i);
+        for k in 0..paths.hits.len() {
+            let i = paths.hits[k] as usize;
+            let Some(hit) = work.hits.get(i) else { continue };
             let v = scene.vertex(&rays.get(i), hit, batch.spread);
             out.alpha[i] = 1.0;
             if batch.want_first {
@@ -170,7 +175,8 @@ impl PathTracer {
                 index: i as u32,
             };
             block.add_emission(&state, &v, rays.direction(i), out);
-            self.scatter(&block, &state, &v, work, paths);
+            let point = paths.points.get(k);
+            self.scatter(&block, &state, &v, &point, work, paths);
         }
         paths.escapes.add_background(scene, &mut out.li);
         block.resolve_shadows(work, paths, out);
@@ -188,16 +194,20 @@ impl PathTracer {
         work.counts.scattered += rays.len() as u64;
         block.scene.kernel.intersect_batch(rays, &mut work.hits, Coherence::Incoherent);
         paths.begin(&mut work.next, &mut work.shadow);
-        for i in 0..rays.len() {
+        paths.sort_out(&work.hits, rays);
+        let goes_on = block.depth <= self.max_depth;
+        if goes_on {
+            paths.draw(block, self.light_sampling, |states, i| states[i as usize].index);
+        }
+        for k in 0..paths.hits.len() {
+            let i = paths.hits[k] as usize;
+            let Some(hit) = work.hits.get(i) else { continue };
             let state = paths.states[i];
-            let Some(hit) = work.hits.get(i) else {
-                paths.escapes.push(i as u32, rays.direction(i));
-                continue;
-            };
             let v = block.scene.vertex(&rays.get(i), hit, 0.0);
             block.add_emission(&state, &v, rays.direction(i), out);
-            if block.depth <= self.max_depth {
-                self.scatter(block, &state, &v, work, paths);
+            if goes_on {
+                let point = paths.points.get(k);
+                self.scatter(block, &state, &v, &point, work, paths);
             }
         }
         block.add_escapes(paths, out);
@@ -210,6 +220,7 @@ impl PathTracer {
         block: &Block,
         state: &PathState,
         v: &Vertex,
+        point: &VertexPoint,
         work: &mut Workspace,
         paths: &mut PathScratch,
     ) {
@@ -219,11 +230,10 @@ impl PathTracer {
         }
         let mut prepared = Prepared::default();
         material.prepare(v, &mut prepared);
-        let surface = SurfacePoint { v, material, prepared: &prepared, wo: v.frame.to_local(v.wo) };
-        let id = block.ids[state.index as usize];
+        let surface = SurfacePoint { v, material, prepared: &prepared, wo: v.frame.to_local(v.wo), point };
         let lit = self.light_sampling && !material.is_delta();
         if lit {
-            block.sample_light(state, &surface, &id, work, paths);
+            block.sample_light(state, &surface, work, paths);
         }
         self.extend(block, state, &surface, lit, work, paths);
     }
@@ -237,16 +247,14 @@ impl PathTracer {
         work: &mut Workspace,
         paths: &mut PathScratch,
     ) {
-        let id = block.ids[state.index as usize];
-        let dim = |slot| Dim::at(block.depth, slot);
-        let u = id.sampler.get_2d(id.index, dim(Slot::BsdfUv));
+        let id = &s.point.id;
         let roulette = block.depth >= self.roulette_depth && block.depth < self.max_depth;
         let lobe = if roulette || s.material.picks_lobe() {
-            id.sampler.get_2d(id.index, dim(Slot::LobeAndRoulette))
+            id.sampler.get_2d(id.index, Dim::at(block.depth, Slot::LobeAndRoulette))
         } else {
             [0.0; 2]
         };
-        let Some(b) = s.material.sample(s.prepared, s.wo, u, lobe[0]) else { return };
+        let Some(b) = s.material.sample(s.prepared, s.wo, s.point.bsdf, lobe[0]) else { return };
         let wi = s.v.frame.to_world(b.wi);
         let mut beta = state.beta * b.weight;
         if beta.is_black() || !s.v.is_consistent(wi) {
@@ -260,7 +268,7 @@ impl PathTracer {
             }
             beta = beta / q;
         }
-        work.next.push(&s.v.spawn(wi, key(&id, block.depth + 1)));
+        work.next.push(&s.v.spawn(wi, key(id, block.depth + 1)));
         paths.next.push(PathState {
             beta,
             pdf: if b.delta || !lit { f32::INFINITY } else { b.pdf },
@@ -276,9 +284,28 @@ struct SurfacePoint<'a> {
     material: &'a dyn Material,
     prepared: &'a Prepared,
     wo: Vec3,
+    point: &'a VertexPoint,
 }
 
 impl PathScratch {
+    /// Which rays met something, and which leave.
+    fn sort_out(&mut self, hits: &HitBatch, rays: &RayBatch) {
+        self.hits.clear();
+        for (i, &prim) in (0..).zip(&hits.prim) {
+            if prim == NO_PRIMITIVE {
+                self.escapes.push(i, rays.direction(i as usize));
+            } else {
+                self.hits.push(i);
+            }
+        }
+    }
+
+    /// Draws the points of all hits; `path_of` tells the path of a ray.
+    fn draw(&mut self, block: &Block, with_light: bool, path_of: impl Fn(&[PathState], u32) -> u32) {
+        let paths = self.hits.iter().map(|&i| path_of(&self.states, i));
+        self.points.draw(block.ids, paths, block.depth, with_light);
+    }
+
     fn begin(&mut self, next: &mut RayBatch, shadow: &mut RayBatch) {
         self.next.clear();
         self.pending.clear();
@@ -294,22 +321,20 @@ impl Block<'_> {
         &self,
         state: &PathState,
         s: &SurfacePoint,
-        id: &PathId,
         work: &mut Workspace,
         paths: &mut PathScratch,
     ) {
         let lights = &self.scene.lights;
-        let dim = |slot| Dim::at(self.depth, slot);
+        let id = &s.point.id;
         let pick = if self.scene.features.many_lights {
-            id.sampler.get_1d(id.index, dim(Slot::LightPick))
+            id.sampler.get_1d(id.index, Dim::at(self.depth, Slot::LightPick))
         } else {
             0.0
         };
         let at = s.v.receiver();
         let Some(chosen) = lights.sampler.sample(&at, pick) else { return };
-        let u = id.sampler.get_2d(id.index, dim(Slot::LightUv));
         let light = &lights.list[chosen.light as usize];
-        let Some(l) = light.sample_li(&at, u) else { return };
+        let Some(l) = light.sample_li(&at, s.point.light) else { return };
         if !s.v.is_consistent(l.wi) {
             return;
         }

@@ -116,9 +116,9 @@ fn irradiance(light: &AreaLight, n: DVec3, samples: u32) -> (f64, f64) {
     let mut rng = TestRng::new(7);
     let (mut sum, mut sum2) = (0.0, 0.0);
     for _ in 0..samples {
-        let e = light
-            .sample_li(&at, rng.vec2().to_array())
-            .map_or(0.0, |s| f64::from(light.arriving(&s).r) * n.dot(s.wi.as_dvec3()).max(0.0) / f64::from(s.pdf));
+        let e = light.sample_li(&at, rng.vec2().to_array()).map_or(0.0, |s| {
+            f64::from(light.arriving(&s).r) * n.dot(s.wi.as_dvec3()).max(0.0) / f64::from(s.pdf)
+        });
         sum += e;
         sum2 += e * e;
     }

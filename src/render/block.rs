@@ -5,10 +5,10 @@ use super::layers::Layers;
 use super::settings::RenderSettings;
 use crate::base::camera::FilmSamples;
 use crate::base::pixel_rect::PixelRect;
-use crate::integrators::{CameraBatch, Integrator, PathId, PathResults, Workspace};
-use crate::sampler::{Dim, ray_key};
+use crate::integrators::{CameraBatch, Integrator, PathId, PathIds, PathResults, Workspace};
+use crate::math::simd;
+use crate::sampler::{Dim, points_2d, ray_key};
 use crate::scene::Scene;
-use glam::Vec2;
 use std::ops::Range;
 
 /// Rays that are traced together. Large enough that the kernel's batches and the loops over columns run long,
@@ -50,6 +50,7 @@ pub struct Worker {
     film_y: Vec<f32>,
     lens_u: Vec<f32>,
     lens_v: Vec<f32>,
+    uv: [Vec<f32>; 2],
     batch: CameraBatch,
     results: PathResults,
     /// Scratch memory and ray counts.
@@ -75,6 +76,23 @@ pub fn replicate_indices(range: &Range<u32>, r: u32) -> Range<u32> {
     first(range.start)..first(range.end)
 }
 
+/// Keys of camera rays.
+struct FirstKeys<'a> {
+    ids: &'a PathIds,
+    out: &'a mut [u32],
+}
+
+impl simd::Kernel for FirstKeys<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for ((out, &key), &index) in self.out.iter_mut().zip(&self.ids.keys).zip(&self.ids.indices) {
+            *out = ray_key(key, index, 1);
+        }
+    }
+}
+
 impl Worker {
     /// A worker for a render.
     pub fn new(settings: &RenderSettings) -> Self {
@@ -86,6 +104,7 @@ impl Worker {
             film_y: Vec::new(),
             lens_u: Vec::new(),
             lens_v: Vec::new(),
+            uv: Default::default(),
             batch: CameraBatch::default(),
             results: PathResults::default(),
             work: Workspace::default(),
@@ -120,39 +139,37 @@ impl Worker {
         self.flush(job);
     }
 
-    /// Film and lens positions of a run.
+    /// Notes a run: whose samples they are, and at which pixel.
     fn add_run(&mut self, job: &Job, run: Run) {
         let s = job.settings;
         let end = run.start + run.len;
         let sampler = s.sampler.pixel(s.seed, run.x, run.y, run.replicate);
-        self.film_x.resize(end, 0.5);
-        self.film_y.resize(end, 0.5);
-        let (xs, ys) = (&mut self.film_x[run.start..], &mut self.film_y[run.start..]);
-        if s.spp == 1 {
-            // A single sample goes through the pixel's centre.
-            xs.fill(run.x as f32 + 0.5);
-            ys.fill(run.y as f32 + 0.5);
-        } else {
-            sampler.fill_2d(run.first_index, Dim::FILTER, xs, ys);
-            for (x, y) in xs.iter_mut().zip(ys) {
-                let offset = s.filter.sample(Vec2::new(*x, *y));
-                *x = run.x as f32 + 0.5 + offset.x;
-                *y = run.y as f32 + 0.5 + offset.y;
-            }
+        let key = ray_key(run.x, run.y, run.replicate);
+        self.batch.ids.extend(PathId { sampler, index: run.first_index, key }, run.len);
+        self.film_x.resize(end, run.x as f32 + 0.5);
+        self.film_y.resize(end, run.y as f32 + 0.5);
+        self.runs.push(run);
+    }
+
+    /// From pixels to positions on the film and the lens, and keys.
+    fn place_samples(&mut self, job: &Job) {
+        let n = self.film_x.len();
+        let ids = &self.batch.ids;
+        self.batch.rays.resize(n);
+        simd::dispatch(FirstKeys { ids, out: &mut self.batch.rays.key });
+        let [u, v] = &mut self.uv;
+        // A single sample goes through the pixel's centre.
+        if job.settings.spp > 1 {
+            u.resize(n, 0.0);
+            v.resize(n, 0.0);
+            points_2d(&ids.samplers, &ids.indices, Dim::FILTER, u, v);
+            job.settings.filter.add_offsets([u, v], [&mut self.film_x, &mut self.film_y]);
         }
         if job.scene.camera.has_lens() {
-            self.lens_u.resize(end, 0.5);
-            self.lens_v.resize(end, 0.5);
-            let (us, vs) = (&mut self.lens_u[run.start..], &mut self.lens_v[run.start..]);
-            sampler.fill_2d(run.first_index, Dim::LENS, us, vs);
+            self.lens_u.resize(n, 0.5);
+            self.lens_v.resize(n, 0.5);
+            points_2d(&ids.samplers, &ids.indices, Dim::LENS, &mut self.lens_u, &mut self.lens_v);
         }
-        let key = ray_key(run.x, run.y, run.replicate);
-        self.batch.ids.extend((0..run.len as u32).map(|i| PathId {
-            sampler,
-            index: run.first_index + i,
-            key,
-        }));
-        self.runs.push(run);
     }
 
     /// Traces what has been gathered and adds it to the tile.
@@ -160,12 +177,10 @@ impl Worker {
         if self.film_x.is_empty() {
             return;
         }
+        self.place_samples(job);
         let samples =
             FilmSamples { x: &self.film_x, y: &self.film_y, lens_u: &self.lens_u, lens_v: &self.lens_v };
         job.scene.camera.fill_rays(&samples, &mut self.batch.rays);
-        for (ray_key_out, id) in self.batch.rays.key.iter_mut().zip(&self.batch.ids) {
-            *ray_key_out = ray_key(id.key, id.index, 1);
-        }
         job.integrator.trace(job.scene, &self.batch, &mut self.work, &mut self.results);
         let runs = std::mem::take(&mut self.runs);
         for run in &runs {
@@ -175,8 +190,6 @@ impl Worker {
         self.runs.clear();
         self.film_x.clear();
         self.film_y.clear();
-        self.lens_u.clear();
-        self.lens_v.clear();
         self.batch.ids.clear();
     }
 

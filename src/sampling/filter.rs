@@ -9,6 +9,7 @@ use glam::Vec2;
 
 use super::warp::tent;
 use crate::error::{Error, Result, unknown_name};
+use crate::math::simd::{Kernel, dispatch};
 use crate::math::trig::sin_cos_2pi_f64;
 
 /// How samples are spread about a pixel's centre; the same in x and y, independently.
@@ -72,6 +73,13 @@ impl PixelFilter {
         }
     }
 
+    /// Adds [`PixelFilter::sample`] of each point of the unit square to a position. All columns are of one length.
+    pub fn add_offsets(self, u: [&[f32]; 2], p: [&mut [f32]; 2]) {
+        for (u, p) in u.into_iter().zip(p) {
+            dispatch(AddOffsets { filter: self, u, p });
+        }
+    }
+
     /// Offset from the pixel's centre, in pixels, for `u` in the unit square. Continuous, and monotone in each
     /// coordinate; (1/2, 1/2) is the centre.
     #[inline]
@@ -94,6 +102,30 @@ impl FromStr for PixelFilter {
         let found = Self::NAMES.iter().find(|(name, _)| *name == s);
         let known = Self::NAMES.iter().map(|(name, _)| *name);
         found.map(|(_, filter)| *filter).ok_or_else(|| Error::Usage(unknown_name("filter", s, known)))
+    }
+}
+
+/// One axis of [`PixelFilter::add_offsets`].
+struct AddOffsets<'a> {
+    filter: PixelFilter,
+    u: &'a [f32],
+    p: &'a mut [f32],
+}
+
+impl Kernel for AddOffsets<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let all = self.p.iter_mut().zip(self.u);
+        match self.filter {
+            PixelFilter::BlackmanHarris { radius } => {
+                let table = &*BLACKMAN_HARRIS;
+                all.for_each(|(p, &u)| *p += table.sample(u) * radius);
+            }
+            PixelFilter::Box => all.for_each(|(p, &u)| *p += u - 0.5),
+            PixelFilter::Tent { radius } => all.for_each(|(p, &u)| *p += tent(u) * radius),
+        }
     }
 }
 
@@ -139,7 +171,7 @@ fn half_mass(x: f64) -> f64 {
 }
 
 impl HalfTable {
-    #[inline]
+    #[inline(always)]
     fn sample(&self, u: f32) -> f32 {
         let v = 2.0 * u - 1.0;
         let at = v.abs() * STEPS as f32;

@@ -81,7 +81,8 @@ impl Cube {
             let (x, y) = (x as i32 - 1, y as i32 - 1);
             let inside = |i: i32| (0..n as i32).contains(&i);
             // Nothing is at the corners of the border; any texel will do.
-            let (face, x, y) = if inside(x) || inside(y) { source_texel(n, face, x, y) } else { (face, 0, 0) };
+            let (face, x, y) =
+                if inside(x) || inside(y) { source_texel(n, face, x, y) } else { (face, 0, 0) };
             (face, y * n + x)
         };
         let tiles = Tiles::new(faces, 6, [n + 2, n + 2], source);

@@ -107,8 +107,7 @@ impl Strides {
             + (y & LAST) * SIDE as u32
             + (x & LAST);
         let right = if x & LAST == LAST { AREA as u32 - LAST } else { 1 };
-        let down =
-            if y & LAST == LAST { self.row_of_blocks - LAST * SIDE as u32 } else { SIDE as u32 };
+        let down = if y & LAST == LAST { self.row_of_blocks - LAST * SIDE as u32 } else { SIDE as u32 };
         Footprint { at, right, down, fx, fy }
     }
 }

@@ -1,0 +1,54 @@
+//! The sample points of all surface points of one depth, made together: eight paths at a time where one by one each
+//! would wait for itself.
+
+use super::{PathId, PathIds};
+use crate::sampler::{Dim, Slot, points_2d};
+
+/// Points by surface point.
+#[derive(Default)]
+pub struct VertexPoints {
+    ids: PathIds,
+    light: [Vec<f32>; 2],
+    bsdf: [Vec<f32>; 2],
+}
+
+/// What one surface point draws.
+#[derive(Debug, Clone, Copy)]
+pub struct VertexPoint {
+    /// Whose it is.
+    pub id: PathId,
+    /// See [`Slot::LightUv`]; not set unless asked for.
+    pub light: [f32; 2],
+    /// See [`Slot::BsdfUv`].
+    pub bsdf: [f32; 2],
+}
+
+impl VertexPoints {
+    /// Draws for `paths` (indices into `ids`) at a depth.
+    pub fn draw(&mut self, ids: &PathIds, paths: impl Iterator<Item = u32>, depth: u32, with_light: bool) {
+        self.ids.clear();
+        for i in paths {
+            let id = ids.get(i as usize);
+            self.ids.samplers.push(id.sampler);
+            self.ids.indices.push(id.index);
+            self.ids.keys.push(id.key);
+        }
+        fill(&self.ids, Dim::at(depth, Slot::BsdfUv), &mut self.bsdf);
+        if with_light {
+            fill(&self.ids, Dim::at(depth, Slot::LightUv), &mut self.light);
+        }
+    }
+
+    /// Those of the `k`th path.
+    #[inline]
+    pub fn get(&self, k: usize) -> VertexPoint {
+        let at = |c: &[Vec<f32>; 2]| [0, 1].map(|a| c[a].get(k).copied().unwrap_or(0.0));
+        VertexPoint { id: self.ids.get(k), light: at(&self.light), bsdf: at(&self.bsdf) }
+    }
+}
+
+fn fill(ids: &PathIds, dim: Dim, [x, y]: &mut [Vec<f32>; 2]) {
+    x.resize(ids.indices.len(), 0.0);
+    y.resize(ids.indices.len(), 0.0);
+    points_2d(&ids.samplers, &ids.indices, dim, x, y);
+}
