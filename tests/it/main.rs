@@ -5,5 +5,6 @@ mod common;
 mod geometry;
 mod layers;
 mod light;
+mod open_house;
 mod reference;
 mod source;
