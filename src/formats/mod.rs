@@ -50,12 +50,19 @@ pub fn load_with(path: &Path, families: &Families) -> Result<SceneDesc> {
     if is_mesh_path(path) {
         return mesh_scene::load(path);
     }
-    let extension = source::content_extension(path).unwrap_or_default();
-    if extension == NATIVE {
+    let extension = source::content_extension(path);
+    if extension.as_deref() == Some(NATIVE) {
         return native::load(path, families);
     }
-    let what =
-        unknown_name("kind of scene file", &extension, std::iter::once(NATIVE).chain(mesh_extensions()));
+    let known = || std::iter::once(NATIVE).chain(mesh_extensions());
+    let what = match extension {
+        _ if path.is_dir() => "is a folder, where a scene file or a mesh is wanted".to_owned(),
+        Some(extension) => unknown_name("kind of scene file", &extension, known()),
+        None => {
+            let known = known().collect::<Vec<_>>().join(", ");
+            format!("has no extension, which would tell the kind of file; known: {known}")
+        }
+    };
     Err(Error::content(path, what))
 }
 

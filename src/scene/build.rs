@@ -70,7 +70,16 @@ pub fn build_with(mut desc: SceneDesc, options: &BuildOptions, registry: &Regist
     let camera = build_camera(&desc, &plan, film, registry)?.place(&space, film)?;
     let mut objects = ObjectTable { named: &named, registry, objects: Vec::new() };
     let mut report = BuildReport { groups: plan.groups.len(), ..BuildReport::default() };
+    let has_objects = plan.has_objects;
     let geometry = Arc::new(place_groups(plan, &mut objects, &mut report)?);
+    match desc.objects.first() {
+        Some(first) if has_objects && geometry.root().paths == 0 => {
+            let message = format!("nothing in the scene can be rendered: left out are {}", report.dropped);
+            return Err(Error::Content { place: first.place.clone(), message });
+        }
+        Some(_) => {}
+        None => log::warn!("the scene has no object: the picture shows what is behind objects"),
+    }
     let objects = objects.objects;
     let root = geometry.root();
     report.paths = root.paths;
@@ -197,11 +206,6 @@ fn place_groups(plan: GroupPlan, objects: &mut ObjectTable, report: &mut BuildRe
         }
         geometry.groups.push(out);
     }
-    if geometry.root().paths == 0 && plan.has_objects {
-        return Err(Error::Usage(
-            "nothing in the scene can be rendered: every primitive is degenerate".into(),
-        ));
-    }
     Ok(geometry)
 }
 
@@ -221,7 +225,7 @@ fn place_shapes(
         report.dropped = report.dropped + placed.dropped;
         let shape = placed.shape;
         if shape.primitive_count() == 0 {
-            log::warn!("{} {}: every primitive of it is degenerate", kind, object.name);
+            log::warn!("{kind} {}: nothing of it can be hit; left out are {}", object.name, placed.dropped);
             continue;
         }
         report.geometry_bytes += shape.memory();

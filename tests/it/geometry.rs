@@ -6,6 +6,7 @@ use skylit::base::ray::Ray;
 use skylit::render::Rendered;
 use skylit::scene::Scene;
 use skylit::scene::desc::{Content, ObjectDesc, SceneDesc};
+use std::f64::consts::{PI, TAU};
 
 /// Pixels whose means differ by more than a relative 1e-4 (thin silhouettes may fall to either side of a ray).
 fn different(a: &Rendered, b: &Rendered) -> usize {
@@ -131,6 +132,52 @@ fn a_georeferenced_scene_renders_as_its_local_twin() {
             .map(|d| render(&build_on(backend, d.clone()), integrator("path", &[("max_depth", 2.0)]), 4));
         assert!(different(&a, &b) <= 15, "{backend}: {} of 1536 pixels differ", different(&a, &b));
     }
+}
+
+/// A ball of bumps as the text of an OBJ file, around `center`.
+fn ball(center: DVec3) -> String {
+    let (rows, columns) = (16, 24);
+    let mut text = String::new();
+    for i in 0..=rows {
+        for j in 0..columns {
+            let (theta, phi) = (PI * f64::from(i) / f64::from(rows), TAU * f64::from(j) / f64::from(columns));
+            let r = 1.0 + 0.1 * (5.0 * phi).cos() * (4.0 * theta).sin();
+            let p = center + DVec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin()) * r;
+            text += &format!("v {:.6} {:.6} {:.6}\n", p.x, p.y, p.z);
+        }
+    }
+    for i in 0..rows {
+        for j in 0..columns {
+            let at = |i: i32, j: i32| i * columns + j % columns + 1;
+            text += &format!("f {} {} {} {}\n", at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j));
+        }
+    }
+    text
+}
+
+/// The offset stands in the mesh file itself, where f32 would keep a quarter of a metre.
+#[test]
+fn a_georeferenced_mesh_renders_as_its_local_twin() {
+    let picture = |center: DVec3| {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join("ball.obj"), ball(center)).unwrap();
+        let view = VIEW
+            .replace(
+                "eye = [6, 4, 9]",
+                &format!("eye = {:?}", (center + DVec3::new(3.0, 2.0, 4.5)).to_array()),
+            )
+            .replace("look_at = [0, 0, 0]", &format!("look_at = {:?}", center.to_array()));
+        let path = dir.path().join("scene.toml");
+        let object = "[[objects]]\nshape = { type = \"mesh\", path = \"ball.obj\" }\nmaterial = \"clay\"\n";
+        std::fs::write(&path, format!("{view}{object}")).unwrap();
+        let desc = skylit::formats::load(&path).unwrap();
+        render(&build_on(backends()[0], desc), integrator("path", &[("max_depth", 2.0)]), 4)
+    };
+    let [local, far] = [DVec3::ZERO, DVec3::new(4_000_000.0, 250.0, -5_600_000.0)].map(picture);
+    let seen = local.film.window().pixels().filter(|&(x, y)| local.film.alpha(x, y) > 0.0).count();
+    assert!(seen > 300, "{seen} pixels show the mesh");
+    // Corners are written to a micrometre in both, and recentred by other roundings: a few grazing rays.
+    assert!(different(&local, &far) <= 15, "{} pixels differ", different(&local, &far));
 }
 
 #[test]

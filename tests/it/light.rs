@@ -3,6 +3,7 @@
 use crate::common::{assert_mean, integrator, mean, render, scene, settings};
 use skylit::render::settings::RenderSettings;
 use skylit::render::{Renderer, Silent};
+use std::f64::consts::PI;
 
 /// Six standard errors: a false alarm in 5e8 comparisons.
 const SIGMAS: f64 = 6.0;
@@ -81,14 +82,65 @@ shape = {{ type = "rectangle", center = [-5, -5, 5] }}
     }
 }
 
+/// Radiance grows with the height of the direction, so the irradiance of a slope is a short integral: of a constant
+/// pi, of (n.w)+ (y)+ 2 pi / 3 where n is y, 2 / 3 where it is level, 0 where it is -y.
 #[test]
-fn a_white_body_under_a_constant_sky_vanishes() {
-    let s = scene(&ball("type = \"constant\"\nradiance = [1, 1, 1]", "type = \"diffuse\"\nalbedo = 1.0"));
-    let m = mean(&render(&s, integrator("path", &[("max_depth", 64.0)]), 16));
-    assert_mean("white furnace", &m, 1.0, 0.0, 2e-6);
-    let s = scene(&ball("type = \"constant\"\nradiance = [1, 1, 1]", "type = \"mirror\"\nreflectance = 1.0"));
-    let m = mean(&render(&s, integrator("path", &[]), 16));
-    assert_mean("mirror furnace", &m, 1.0, 0.0, 2e-6);
+fn slopes_under_a_gradient_sky_have_their_closed_form() {
+    let [zenith, horizon, ground] = [2.0, 0.7, 0.1];
+    let irradiance =
+        |above: f64, below: f64| PI * horizon + (zenith - horizon) * above + (ground - horizon) * below;
+    for (eye, up, u, v, expected) in [
+        ("0, 2, 0", "0, 0, 1", "0, 0, 1", "1, 0, 0", irradiance(2.0 * PI / 3.0, 0.0)),
+        ("0, -2, 0", "0, 0, 1", "0, 0, 1", "1, 0, 0", irradiance(0.0, 2.0 * PI / 3.0)),
+        ("2, 0, 0", "0, 1, 0", "0, 1, 0", "0, 0, 1", irradiance(2.0 / 3.0, 2.0 / 3.0)),
+    ] {
+        let s = scene(&format!(
+            r#"
+[film]
+size = [16, 16]
+[camera]
+type = "perspective"
+eye = [{eye}]
+look_at = [0, 0, 0]
+up = [{up}]
+fov_deg = 4
+[sky]
+type = "gradient"
+zenith = {zenith}
+horizon = {horizon}
+ground = {ground}
+[materials.m]
+type = "diffuse"
+albedo = 0.6
+[[objects]]
+shape = {{ type = "rectangle", edge_u = [{u}], edge_v = [{v}] }}
+material = "m"
+"#
+        ));
+        for light_sampling in [0.0, 1.0] {
+            let m = mean(&render(&s, integrator("direct", &[("light_sampling", light_sampling)]), 256));
+            assert!(m.error < 1e-3, "{eye}: {}", m.error);
+            assert_mean(eye, &m, 0.6 / PI * expected, SIGMAS, 1e-5);
+        }
+    }
+}
+
+/// Of every material with no loss, under the same light from everywhere: it cannot be told from the sky.
+#[test]
+fn white_materials_vanish_in_a_furnace() {
+    for (material, tolerance) in [
+        ("type = \"diffuse\"\nalbedo = 1.0", 2e-6),
+        ("type = \"mirror\"\nreflectance = 1.0", 2e-6),
+        // Light between facets is added back by a table of finite size.
+        ("type = \"metal\"\ncolor = 1.0\nroughness = 0.2", 0.01),
+        ("type = \"metal\"\ncolor = 1.0\nroughness = 0.7", 0.01),
+        ("type = \"metal\"\ncolor = 1.0\nroughness = 1.0", 0.01),
+        ("type = \"emissive\"\nradiance = 0.4\nalbedo = 0.6", 2e-6),
+    ] {
+        let s = scene(&ball("type = \"constant\"", material));
+        let m = mean(&render(&s, integrator("path", &[]), 64));
+        assert_mean(material, &m, 1.0, SIGMAS, tolerance);
+    }
 }
 
 /// A closed room that emits and scatters: every point shines with e / (1 - a), the sum of all its echoes.
@@ -212,7 +264,7 @@ intensity = [8, 8, 8]
 "#,
     );
     let m = mean(&render(&s, integrator("path", &[]), 16));
-    let expected = 0.5 / std::f64::consts::PI * 8.0 / 4.0;
+    let expected = 0.5 / PI * 8.0 / 4.0;
     assert_mean("point light", &m, expected, SIGMAS, 5e-5 * expected);
 }
 

@@ -3,6 +3,7 @@
 mod cli;
 mod common;
 mod geometry;
+mod kernels;
 mod layers;
 mod light;
 mod open_house;
