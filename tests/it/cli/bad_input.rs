@@ -64,6 +64,25 @@ fn missing_and_unwritable_files_are_told_first() {
     f.refuses("render scene -o a.png", 2, &["scene", "no extension", "known: toml, obj, ply"]);
 }
 
+/// A limit on the size of files, and by the same way a full disk, is an error that leaves nothing behind.
+#[test]
+#[cfg(unix)]
+fn a_picture_that_does_not_fit_is_told_and_leaves_nothing() {
+    let f = Folder::new();
+    let before = f.listing();
+    let limited =
+        "ulimit -f 8; exec \"$0\" render tri.ply -o a.exr --size 200x200 --spp 1 --sky constant --quiet";
+    let output = std::process::Command::new("sh")
+        .args(["-c", limited, env!("CARGO_BIN_EXE_skylit")])
+        .current_dir(f.path())
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(3), "{} {text}", output.status);
+    assert!(text.contains("a.exr: cannot write"), "{text}");
+    assert_eq!(f.listing(), before);
+}
+
 fn ply(corners: [&str; 4], faces: &str) -> String {
     format!(
         "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\

@@ -8,7 +8,7 @@ mod material;
 mod shape;
 mod sky;
 
-use crate::common::{Mean, assert_mean, integrator, mean, render};
+use crate::common::{assert_mean, integrator, mean, render};
 use skylit::base::intersectable::KernelOptions;
 use skylit::formats::families::Families;
 use skylit::formats::load_with;
@@ -171,7 +171,7 @@ material = "leaf"
     let [a, b] = ["embree", "brute"]
         .map(|backend| render(&scene_on(backend, &toml), integrator("path", &[]), 16).film);
     assert!(a == b);
-    let Mean { value, .. } = mean(&render(&scene_on("brute", &toml), integrator("path", &[]), 16));
+    let value = mean(&render(&scene_on("brute", &toml), integrator("path", &[]), 16)).value;
     assert!(value > 0.1, "there is something to see: {value}");
 }
 
