@@ -117,7 +117,11 @@ pub fn unknown_name<'a>(what: &str, name: &str, known: impl IntoIterator<Item = 
 /// The known name that `name` was most likely meant to be, if any is near: at most a third of it is wrong, and one
 /// letter more.
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let far = |k: &str| 1 + k.len().max(name.len()) / 3;
+    // Of words as short as extensions a third and one is nearly all: no more than half.
+    let far = |k: &str| {
+        let length = k.len().max(name.len());
+        (1 + length / 3).min(length / 2)
+    };
     known
         .into_iter()
         // The lengths alone tell most apart, and keep the cost of a monstrous name small.
@@ -139,6 +143,8 @@ mod tests {
         assert_eq!(text, r#"unknown material "glas"; did you mean "glass"? known: diffuse, glass, mirror"#);
         let text = unknown_name("material", "quartz", known);
         assert_eq!(text, r#"unknown material "quartz"; known: diffuse, glass, mirror"#);
+        let text = unknown_name("mesh file", "glb", ["obj", "ply"]);
+        assert_eq!(text, r#"unknown mesh file "glb"; known: obj, ply"#);
         assert_eq!(unknown_name("material", "quartz", []), r#"unknown material "quartz""#);
         let text = unknown_name("material", &"long".repeat(1 << 18), known);
         assert!(text.len() < 200, "{text}");

@@ -2,6 +2,7 @@
 //! of a sampler against its density, and the place of shared test data.
 
 mod chi_square;
+pub mod outside;
 mod quadrature;
 pub mod rows;
 

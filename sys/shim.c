@@ -1,5 +1,6 @@
 #include "shim.h"
 
+#include <math.h>
 #include <string.h>
 
 _Static_assert(offsetof(EmQuery, context) == 0, "callbacks cast the context back to the query");
@@ -155,12 +156,40 @@ void em_occluded1(RTCScene scene, EmQuery* query, struct RTCRay* ray) {
   rtcOccluded1(scene, &query->context, ray);
 }
 
+/* A packet of a width that is not native to the CPU (16 without AVX-512, 8 without AVX; every width in a build without
+ * packets) goes through Embree 3's stream filter, whatever the flags, and that never looks at `valid`: measured on
+ * 3.13.5, its lanes that are off come back hit. The filter leaves out rays whose segment is empty, so lanes that are
+ * off get an empty one for the time of the call. Returns whether there are any. */
+static inline bool empty_segments(const int* valid, float* tfar, float* kept, unsigned int n) {
+  unsigned int k;
+  int all = -1;
+  for (k = 0; k < n; ++k) all &= valid[k];
+  if (all) return false;
+  for (k = 0; k < n; ++k) {
+    kept[k] = tfar[k];
+    if (!valid[k]) tfar[k] = -INFINITY; /* below any tnear, also one that is infinite itself */
+  }
+  return true;
+}
+
+static inline void restore_segments(const int* valid, float* tfar, const float* kept, unsigned int n) {
+  unsigned int k;
+  for (k = 0; k < n; ++k)
+    if (!valid[k]) tfar[k] = kept[k];
+}
+
 #define PACKET(N)                                                                                         \
   void em_intersect##N(const int* valid, RTCScene scene, EmQuery* query, struct RTCRayHit##N* rayhit) {   \
+    float kept[N];                                                                                        \
+    const bool off = empty_segments(valid, rayhit->ray.tfar, kept, N);                                    \
     rtcIntersect##N(valid, scene, &query->context, rayhit);                                               \
+    if (off) restore_segments(valid, rayhit->ray.tfar, kept, N);                                          \
   }                                                                                                       \
   void em_occluded##N(const int* valid, RTCScene scene, EmQuery* query, struct RTCRay##N* ray) {          \
+    float kept[N];                                                                                        \
+    const bool off = empty_segments(valid, ray->tfar, kept, N);                                           \
     rtcOccluded##N(valid, scene, &query->context, ray);                                                   \
+    if (off) restore_segments(valid, ray->tfar, kept, N);                                                 \
   }
 
 void em_intersect_stream1(RTCScene scene, EmQuery* query, struct RTCRayHit* rayhits, unsigned int count) {

@@ -36,11 +36,13 @@ typedef struct EmQuery {
 void em_query_init(EmQuery* query, unsigned int coherent, void* user);
 
 void em_intersect1(RTCScene scene, EmQuery* query, struct RTCRayHit* rayhit);
+void em_occluded1(RTCScene scene, EmQuery* query, struct RTCRay* ray);
+
+/* Packets: a lane whose `valid` is 0 takes no part and comes back untouched, on any CPU (Embree 3 alone does not keep
+ * that promise for widths that the CPU lacks: see shim.c). */
 void em_intersect4(const int* valid, RTCScene scene, EmQuery* query, struct RTCRayHit4* rayhit);
 void em_intersect8(const int* valid, RTCScene scene, EmQuery* query, struct RTCRayHit8* rayhit);
 void em_intersect16(const int* valid, RTCScene scene, EmQuery* query, struct RTCRayHit16* rayhit);
-
-void em_occluded1(RTCScene scene, EmQuery* query, struct RTCRay* ray);
 void em_occluded4(const int* valid, RTCScene scene, EmQuery* query, struct RTCRay4* ray);
 void em_occluded8(const int* valid, RTCScene scene, EmQuery* query, struct RTCRay8* ray);
 void em_occluded16(const int* valid, RTCScene scene, EmQuery* query, struct RTCRay16* ray);

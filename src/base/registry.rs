@@ -274,6 +274,15 @@ pub struct Row<T: ?Sized + 'static> {
     pub samples: fn() -> Vec<Params>,
 }
 
+// By hand: a derive would ask the same of `T`.
+impl<T: ?Sized> Clone for Row<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T: ?Sized> Copy for Row<T> {}
+
 /// Finds a row by the node's kind, and checks the node's parameters against it.
 pub fn find<'a, T: ?Sized>(family: &str, table: &'a [Row<T>], node: &Node) -> Result<&'a Row<T>> {
     let row = table.iter().find(|r| r.kind == node.kind).ok_or_else(|| Error::Content {

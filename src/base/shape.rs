@@ -151,6 +151,23 @@ impl Dropped {
     }
 }
 
+impl std::fmt::Display for Dropped {
+    /// "2 primitives with coordinates that are not finite, 1 without area".
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let parts = [
+            (self.out_of_range, "with indices past the last vertex"),
+            (self.not_finite, "with coordinates that are not finite or too large"),
+            (self.degenerate, "without area"),
+        ];
+        let mut noun = if self.total() == 1 { " primitive" } else { " primitives" };
+        for (i, (n, what)) in parts.into_iter().filter(|p| p.0 > 0).enumerate() {
+            write!(f, "{}{n}{noun} {what}", if i > 0 { ", " } else { "" })?;
+            noun = "";
+        }
+        if self.total() == 0 { f.write_str("no primitives: it has none") } else { Ok(()) }
+    }
+}
+
 impl std::ops::Add for Dropped {
     type Output = Dropped;
 

@@ -5,6 +5,7 @@ use crate::base::hit::Hit;
 use crate::base::light::Receiver;
 use crate::base::ray::Ray;
 use crate::base::shape::{LocalRay, Surface};
+use crate::math::bounds::UNDERFLOW;
 use crate::math::frame::Frame;
 use glam::{DMat3, DVec3, Vec2, Vec3};
 
@@ -155,7 +156,8 @@ fn placed(s: &Surface, pl: &Placement) -> PlacedSurface {
     let m = pl.to_render.matrix3;
     let p = pl.to_render.transform_point3(s.p);
     let back = abs(pl.from_render.matrix3) * p.abs() + pl.from_render.translation.abs();
-    let error = abs(m) * (s.error + back * (4.0 * UNIT_ROUNDOFF * 1.01))
+    // Where coordinates are zero, what is left of those four operations is their underflow.
+    let error = abs(m) * (s.error + back * (4.0 * UNIT_ROUNDOFF * 1.01) + DVec3::splat(4.0 * UNDERFLOW))
         // ... and where a kernel maps its hit forward again.
         + (abs(m) * s.p.abs() + pl.to_render.translation.abs()) * (4.0 * UNIT_ROUNDOFF * 1.01);
     // Normals go by the inverse transpose; a mirroring placement keeps outward outward this way.

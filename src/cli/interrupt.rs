@@ -1,9 +1,10 @@
 //! Ctrl-C: at once, but never in the middle of a file.
 
-use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::consts::{SIGINT, SIGTERM, SIGXFSZ};
+use signal_hook::flag;
 use signal_hook::iterator::Signals;
 use signal_hook::low_level;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Held while files are written.
 static WRITING: Mutex<()> = Mutex::new(());
@@ -12,6 +13,10 @@ static WRITING: Mutex<()> = Mutex::new(());
 /// Files being written are finished first. No destructors run: those of native libraries must not, under worker
 /// threads that still trace.
 pub fn listen() {
+    // Heard, the limit on a file's size is an error of the write, which is told and tidied up after; unheard, it kills.
+    if let Err(e) = flag::register(SIGXFSZ, Arc::default()) {
+        log::debug!("cannot listen for SIGXFSZ: {e}");
+    }
     let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else { return };
     std::thread::spawn(move || {
         if let Some(signal) = signals.forever().next() {

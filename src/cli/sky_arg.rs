@@ -40,7 +40,7 @@ pub fn load(word: &str, encoding: Option<SkyEncoding>) -> Result<Node> {
         return Ok(Node { kind: word.to_owned(), ..Node::default() });
     }
     let path = Path::new(word);
-    let is_bare = path.components().count() == 1 && path.extension().is_none() && !word.starts_with('.');
+    let is_bare = path.components().count() <= 1 && path.extension().is_none() && !word.starts_with('.');
     if is_bare && !path.exists() {
         let known = skies.kinds.iter().filter(|k| stands_alone(k)).map(|k| k.name);
         return Err(Error::Usage(format!("{}, or a file or folder", unknown_name("sky", word, known))));

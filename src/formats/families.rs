@@ -1,12 +1,14 @@
 //! Every family of kinds with the type of what its rows build taken away: what scene files, lists and hints need.
 
 use crate::base::registry::{ParamKind, ParamSpec, Row};
+use crate::base::skybox::Skybox;
 use crate::error::unknown_name;
+use crate::integrators;
 use crate::lights::sky::SkySampling;
 use crate::sampler::Sampler;
 use crate::sampling::filter::PixelFilter;
+use crate::scene::registry::Registry;
 use crate::skyboxes::presets;
-use crate::{cameras, integrators, lights, materials, shapes, skyboxes, textures};
 
 /// A registered kind: its name and what it takes.
 #[derive(Debug, Clone, Copy)]
@@ -87,13 +89,18 @@ pub struct Families {
 impl Families {
     /// As registered in this build.
     pub fn registered() -> Self {
+        Families::of(&Registry::default())
+    }
+
+    /// The kinds of these tables, and what is not open.
+    pub fn of(registry: &Registry) -> Self {
         Families {
-            shapes: Family::of("shape", shapes::REGISTRY),
-            materials: Family::of("material", materials::REGISTRY),
-            textures: Family::of("texture", textures::REGISTRY),
-            lights: Family::of("light", lights::REGISTRY),
-            skies: skies(),
-            cameras: Family::of("camera", cameras::REGISTRY),
+            shapes: Family::of("shape", &registry.shapes),
+            materials: Family::of("material", &registry.materials),
+            textures: Family::of("texture", &registry.textures),
+            lights: Family::of("light", &registry.lights),
+            skies: skies(&registry.skies),
+            cameras: Family::of("camera", &registry.cameras),
             integrators: Family::of("integrator", integrators::REGISTRY),
             samplers: Family::of_names("sampler", Sampler::NAMES.map(|(name, s)| (name, s.doc()))),
             filters: Family::of_names("filter", PixelFilter::NAMES.map(|(name, f)| (name, f.doc()))),
@@ -124,8 +131,8 @@ impl Families {
 }
 
 /// Skies: the registered kinds, then the presets, each of which takes the parameters of the kind it is made of.
-fn skies() -> Family {
-    let mut family = Family::of("sky", skyboxes::REGISTRY);
+fn skies(table: &[Row<dyn Skybox>]) -> Family {
+    let mut family = Family::of("sky", table);
     for (name, doc) in presets::names() {
         let kind = presets::preset(name).and_then(|node| family.find(&node.kind).copied());
         family.kinds.extend(kind.map(|k| Kind { name, doc, params: k.params }));

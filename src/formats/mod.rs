@@ -12,6 +12,7 @@ mod triangulate;
 
 use crate::base::mesh_data::MeshData;
 use crate::error::{Error, Result, unknown_name};
+use crate::formats::families::Families;
 use crate::scene::desc::SceneDesc;
 use std::path::Path;
 
@@ -35,17 +36,33 @@ const NATIVE: &str = "toml";
 /// Loads a scene file, or a mesh alone as a scene; the extension tells which.
 ///
 /// # Errors
-/// Those of [`native::load`] and [`mesh_scene::load`]; an unknown extension.
+/// Those of [`load_with`].
 pub fn load(path: &Path) -> Result<SceneDesc> {
+    load_with(path, &Families::registered())
+}
+
+/// As [`load`], where scene files may name the kinds of `families`: with those of a program's own,
+/// [`Families::of`] its [`crate::scene::registry::Registry`].
+///
+/// # Errors
+/// Those of [`native::load`] and [`mesh_scene::load`]; an unknown extension.
+pub fn load_with(path: &Path, families: &Families) -> Result<SceneDesc> {
     if is_mesh_path(path) {
         return mesh_scene::load(path);
     }
-    let extension = source::content_extension(path).unwrap_or_default();
-    if extension == NATIVE {
-        return native::load(path);
+    let extension = source::content_extension(path);
+    if extension.as_deref() == Some(NATIVE) {
+        return native::load(path, families);
     }
-    let what =
-        unknown_name("kind of scene file", &extension, std::iter::once(NATIVE).chain(mesh_extensions()));
+    let known = || std::iter::once(NATIVE).chain(mesh_extensions());
+    let what = match extension {
+        _ if path.is_dir() => "is a folder, where a scene file or a mesh is wanted".to_owned(),
+        Some(extension) => unknown_name("kind of scene file", &extension, known()),
+        None => {
+            let known = known().collect::<Vec<_>>().join(", ");
+            format!("has no extension, which would tell the kind of file; known: {known}")
+        }
+    };
     Err(Error::content(path, what))
 }
 

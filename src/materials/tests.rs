@@ -1,18 +1,23 @@
 //! What every material must satisfy, whatever it is.
 
-use super::REGISTRY;
 use crate::base::material::{BsdfEval, Material, Prepared};
-use crate::base::registry::{Params, Value, build};
+use crate::base::registry::{Params, Row, Value, build};
 use crate::base::shape::Needs;
 use crate::base::texture::Texture;
 use crate::base::vertex::Vertex;
 use crate::color::Rgb;
 use crate::math::Frame;
 use crate::sampling::warp::one_minus_cos;
+use crate::testing::outside;
 use crate::testing::rows::{built, check_rows, node};
 use crate::testing::{Bins, ChiSquare, TestRng, chi_square_sphere, integrate_sphere};
 use glam::{Vec2, Vec3};
 use std::sync::Arc;
+
+/// The crate's materials, and one from outside.
+fn table() -> Vec<Row<dyn Material>> {
+    outside::registry().materials
+}
 
 /// Above this density a lobe is too narrow for quadrature over the whole sphere.
 const NARROW: f32 = 300.0;
@@ -90,12 +95,12 @@ impl Texture for Ramp {
 /// Every sample of every row, and every row with each of its colours textured.
 fn members() -> Vec<Member> {
     let mut all: Vec<Member> =
-        built("material", REGISTRY).into_iter().map(|b| Member::new(b.label, b.it)).collect();
-    for row in REGISTRY {
+        built("material", &table()).into_iter().map(|b| Member::new(b.label, b.it)).collect();
+    for row in table() {
         for spec in row.params.iter().filter(|s| s.kind == crate::base::registry::ParamKind::Texture) {
             let ramp: Arc<dyn Texture> = Arc::new(Ramp);
             let params = Params::new().with(spec.name, Value::Texture(ramp));
-            let it = build("material", REGISTRY, &node(row.kind, &params)).expect("takes a texture");
+            let it = build("material", &table(), &node(row.kind, &params)).expect("takes a texture");
             assert!(it.needs().uv, "{}: a textured material reads uv", row.kind);
             all.push(Member::new(format!("{} with textured {}", row.kind, spec.name), it));
         }
@@ -126,7 +131,7 @@ fn close(a: Rgb, b: Rgb, relative: f32) -> bool {
 
 #[test]
 fn rows_are_sound_and_refuse_bad_parameters() {
-    check_rows("material", REGISTRY);
+    check_rows("material", &table());
 }
 
 #[test]
@@ -305,8 +310,8 @@ fn what_a_material_says_of_itself_is_so() {
 
 #[test]
 fn only_textures_make_a_material_read_the_surface() {
-    for row in REGISTRY {
-        let it = build("material", REGISTRY, &node(row.kind, &Params::new()));
+    for row in table() {
+        let it = build("material", &table(), &node(row.kind, &Params::new()));
         if let Ok(it) = it {
             assert_eq!(it.needs(), Needs::default(), "{}", row.kind);
         }

@@ -13,6 +13,10 @@ pub const U32: f32 = f32::EPSILON * 0.5;
 /// Unit roundoff of f64: 2^-53.
 pub const U64: f64 = f64::EPSILON * 0.5;
 
+/// The smallest normal f32. Below it the analysis by relative errors ends: a result is off by up to 2^-150 where numbers
+/// are allowed to grow small, and by as much as this where they are flushed to zero, which bounds both.
+pub const UNDERFLOW: f64 = f32::MIN_POSITIVE as f64;
+
 /// Relative error bound of `n` f32 roundings: n u / (1 - n u), with u = 2^-24. Higham 2002, lemma 3.1.
 #[inline]
 pub const fn gamma(n: u32) -> f32 {

@@ -3,6 +3,7 @@
 pub mod aabb;
 pub mod bounds;
 pub mod frame;
+pub mod pages;
 pub mod quadric;
 pub mod simd;
 pub mod trig;

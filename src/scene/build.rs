@@ -4,9 +4,10 @@
 use super::desc::{ObjectDesc, SceneDesc};
 use super::features::Features;
 use super::groups::{GroupPlan, PlannedGroup, PlannedShape, build_sources, plan_groups};
+use super::registry::Registry;
 use super::{BuildReport, Lights, Object, Scene};
 use crate::accel;
-use crate::base::camera::{Camera, FilmSize};
+use crate::base::camera::{CameraSource, FilmSize};
 use crate::base::geometry::{Child, Geometry, Group, Leaf};
 use crate::base::intersectable::KernelOptions;
 use crate::base::light::Extent;
@@ -17,7 +18,7 @@ use crate::error::{Error, Result, unknown_name};
 use crate::lights::area::AreaLight;
 use crate::lights::sampler::FixedLightSampler;
 use crate::math::aabb::DAabb;
-use crate::{cameras, lights, materials, skyboxes, textures};
+use crate::{cameras, lights, skyboxes};
 use glam::DAffine3;
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -42,25 +43,48 @@ impl Default for BuildOptions {
 /// More emitting placements than this are refused: each is a light with a table of its own.
 const MAX_AREA_LIGHTS: usize = 1 << 20;
 
-/// Builds a scene.
-pub fn build(mut desc: SceneDesc, options: &BuildOptions) -> Result<Scene> {
+/// Builds a scene of the kinds that this crate registers.
+///
+/// # Errors
+/// Those of [`build_with`].
+pub fn build(desc: SceneDesc, options: &BuildOptions) -> Result<Scene> {
+    build_with(desc, options, &Registry::default())
+}
+
+/// Builds a scene of the kinds in `registry`.
+///
+/// # Errors
+/// [`Error::Content`] at the place of a node whose kind, parameters or references cannot be used; [`Error::Usage`] for
+/// a scene with nothing to show, an unknown kernel, or more than can be represented.
+pub fn build_with(mut desc: SceneDesc, options: &BuildOptions, registry: &Registry) -> Result<Scene> {
     let start = Instant::now();
     if desc.objects.is_empty() && desc.sky.is_none() && desc.lights.is_empty() {
         return Err(Error::Usage("the scene is empty: it has no object, no light and no sky".into()));
     }
-    let named = build_materials(&desc)?;
-    let sources = build_sources(&mut desc)?;
+    let named = build_materials(&desc, registry)?;
+    let sources = build_sources(&mut desc, &registry.shapes)?;
     let plan = plan_groups(&desc, sources)?;
     let space = plan.render_space();
-    let camera = build_camera(&desc, &plan, &space)?;
-    let mut objects = ObjectTable { named: &named, objects: Vec::new() };
+    let [width, height] = desc.film.size;
+    let film = FilmSize { width, height };
+    let camera = build_camera(&desc, &plan, film, registry)?.place(&space, film)?;
+    let mut objects = ObjectTable { named: &named, registry, objects: Vec::new() };
     let mut report = BuildReport { groups: plan.groups.len(), ..BuildReport::default() };
+    let has_objects = plan.has_objects;
     let geometry = Arc::new(place_groups(plan, &mut objects, &mut report)?);
+    match desc.objects.first() {
+        Some(first) if has_objects && geometry.root().paths == 0 => {
+            let message = format!("nothing in the scene can be rendered: left out are {}", report.dropped);
+            return Err(Error::Content { place: first.place.clone(), message });
+        }
+        Some(_) => {}
+        None => log::warn!("the scene has no object: the picture shows what is behind objects"),
+    }
     let objects = objects.objects;
     let root = geometry.root();
     report.paths = root.paths;
-    let extent = Extent { center: root.bounds.center(), radius: root.bounds.radius().max(1e-3) };
-    let lights = gather_lights(&desc, &geometry, &objects, &space, &extent)?;
+    let built = Placed { geometry: &geometry, objects: &objects, space: &space };
+    let lights = gather_lights(&desc, &built, registry)?;
     let features = Features {
         needs: objects.iter().flat_map(|o| &o.materials).fold(Default::default(), |n, m| m.needs().or(n)),
         emitting_surfaces: !lights.by_path.is_empty(),
@@ -77,6 +101,7 @@ pub fn build(mut desc: SceneDesc, options: &BuildOptions) -> Result<Scene> {
         objects,
         lights,
         camera,
+        film,
         background: desc.background,
         space,
         features,
@@ -84,9 +109,12 @@ pub fn build(mut desc: SceneDesc, options: &BuildOptions) -> Result<Scene> {
     })
 }
 
-fn build_camera(desc: &SceneDesc, plan: &GroupPlan, space: &RenderSpace) -> Result<Arc<dyn Camera>> {
-    let [width, height] = desc.film.size;
-    let film = FilmSize { width, height };
+fn build_camera(
+    desc: &SceneDesc,
+    plan: &GroupPlan,
+    film: FilmSize,
+    registry: &Registry,
+) -> Result<Arc<dyn CameraSource>> {
     let framed;
     let node = match &desc.camera {
         Some(node) => node,
@@ -95,16 +123,16 @@ fn build_camera(desc: &SceneDesc, plan: &GroupPlan, space: &RenderSpace) -> Resu
             &framed
         }
     };
-    build_node("camera", cameras::REGISTRY, node)?.place(space, film)
+    build_node("camera", &registry.cameras, node)
 }
 
 type Materials = HashMap<String, Arc<dyn Material>>;
 
-fn build_materials(desc: &SceneDesc) -> Result<Materials> {
+fn build_materials(desc: &SceneDesc, registry: &Registry) -> Result<Materials> {
     let mut named = Materials::new();
     for m in &desc.materials {
-        let node = with_textures(&m.value)?;
-        let built = build_node("material", materials::REGISTRY, &node)?;
+        let node = with_textures(&m.value, registry)?;
+        let built = build_node("material", &registry.materials, &node)?;
         if named.insert(m.name.clone(), built).is_some() {
             return Err(Error::Content {
                 place: m.place.clone(),
@@ -116,11 +144,11 @@ fn build_materials(desc: &SceneDesc) -> Result<Materials> {
 }
 
 /// The node with every nested texture built.
-fn with_textures(node: &Node) -> Result<Node> {
+fn with_textures(node: &Node, registry: &Registry) -> Result<Node> {
     let mut node = node.clone();
     for p in &mut node.params.list {
         if let Value::Node(texture) = &p.value {
-            p.value = Value::Texture(build_node("texture", textures::REGISTRY, texture)?);
+            p.value = Value::Texture(build_node("texture", &registry.textures, texture)?);
         }
     }
     Ok(node)
@@ -129,6 +157,7 @@ fn with_textures(node: &Node) -> Result<Node> {
 /// The scene's objects as they are found, with their materials.
 struct ObjectTable<'a> {
     named: &'a Materials,
+    registry: &'a Registry,
     objects: Vec<Object>,
 }
 
@@ -143,7 +172,7 @@ impl ObjectTable<'_> {
         }
         if materials.is_empty() {
             let neutral = Node { kind: "diffuse".into(), params: Params::new(), place: o.place.clone() };
-            materials.push(build_node("material", materials::REGISTRY, &neutral)?);
+            materials.push(build_node("material", &self.registry.materials, &neutral)?);
         }
         let number = self.objects.len();
         let name = if o.name.is_empty() { format!("{kind} {number}") } else { o.name.clone() };
@@ -177,11 +206,6 @@ fn place_groups(plan: GroupPlan, objects: &mut ObjectTable, report: &mut BuildRe
         }
         geometry.groups.push(out);
     }
-    if geometry.root().paths == 0 && plan.has_objects {
-        return Err(Error::Usage(
-            "nothing in the scene can be rendered: every primitive is degenerate".into(),
-        ));
-    }
     Ok(geometry)
 }
 
@@ -201,7 +225,7 @@ fn place_shapes(
         report.dropped = report.dropped + placed.dropped;
         let shape = placed.shape;
         if shape.primitive_count() == 0 {
-            log::warn!("{} {}: every primitive of it is degenerate", kind, object.name);
+            log::warn!("{kind} {}: nothing of it can be hit; left out are {}", object.name, placed.dropped);
             continue;
         }
         report.geometry_bytes += shape.memory();
@@ -217,17 +241,18 @@ fn place_shapes(
     Ok(out)
 }
 
-fn gather_lights(
-    desc: &SceneDesc,
-    geometry: &Geometry,
-    objects: &[Object],
-    space: &RenderSpace,
-    extent: &Extent,
-) -> Result<Lights> {
+/// What lights have to know of the scene they shine on.
+struct Placed<'a> {
+    geometry: &'a Geometry,
+    objects: &'a [Object],
+    space: &'a RenderSpace,
+}
+
+fn gather_lights(desc: &SceneDesc, placed: &Placed, registry: &Registry) -> Result<Lights> {
     let mut list: Vec<Arc<dyn crate::base::light::Light>> = Vec::new();
     if let Some(sky) = &desc.sky {
         let preset = skyboxes::presets::expand(&sky.node);
-        let skybox = build_node("sky", skyboxes::REGISTRY, preset.as_ref().unwrap_or(&sky.node))?;
+        let skybox = build_node("sky", &registry.skies, preset.as_ref().unwrap_or(&sky.node))?;
         list.push(Arc::new(lights::sky::SkyLight::new(
             skybox,
             &lights::sky::SkyOptions {
@@ -238,15 +263,17 @@ fn gather_lights(
         )?));
     }
     for node in &desc.lights {
-        let source = build_node("light", lights::REGISTRY, node)?;
-        list.push(source.place(space)?);
+        let source = build_node("light", &registry.lights, node)?;
+        list.push(source.place(placed.space)?);
     }
     let mut by_path = HashMap::new();
-    if objects.iter().flat_map(|o| &o.materials).any(|m| m.emitter().is_some()) {
-        add_area_lights(geometry, objects, &mut list, &mut by_path)?;
+    if placed.objects.iter().flat_map(|o| &o.materials).any(|m| m.emitter().is_some()) {
+        add_area_lights(placed.geometry, placed.objects, &mut list, &mut by_path)?;
     }
     let at_infinity = (0..list.len() as u32).filter(|&i| list[i as usize].at_infinity()).collect();
-    let sampler = Box::new(FixedLightSampler::power(&list, extent));
+    let bounds = placed.geometry.root().bounds;
+    let extent = Extent { center: bounds.center(), radius: bounds.radius().max(1e-3) };
+    let sampler = Box::new(FixedLightSampler::power(&list, &extent));
     Ok(Lights { list, sampler, at_infinity, by_path })
 }
 

@@ -2,12 +2,11 @@
 //! group's own origin lies. All of it in double precision.
 
 use super::desc::{Content, ObjectDesc, SceneDesc};
-use crate::base::registry::{Node, Value, build as build_node};
+use crate::base::registry::{Node, Row, Value, build as build_node};
 use crate::base::shape::ShapeSource;
 use crate::base::space::RenderSpace;
 use crate::error::{Error, Place, Result, unknown_name};
 use crate::math::aabb::DAabb;
-use crate::shapes;
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -126,7 +125,7 @@ struct Source {
 /// Builds every shape's source in parallel, and takes the shapes' parameters out of the description, so that the
 /// source alone holds a mesh and can give up its memory. Nodes that name the same loaded mesh with the same
 /// parameters share one source: they become instances of one group.
-pub fn build_sources(desc: &mut SceneDesc) -> Result<Sources> {
+pub fn build_sources(desc: &mut SceneDesc, shapes: &[Row<dyn ShapeSource>]) -> Result<Sources> {
     let objects = desc.objects.iter_mut().chain(desc.groups.iter_mut().flat_map(|g| &mut g.value));
     let mut nodes: Vec<&mut Node> = objects
         .filter_map(|o| match &mut o.content {
@@ -143,7 +142,7 @@ pub fn build_sources(desc: &mut SceneDesc) -> Result<Sources> {
     let built = nodes
         .par_iter()
         .enumerate()
-        .map(|(i, n)| (same_as[i] == i).then(|| build_node("shape", shapes::REGISTRY, n)).transpose())
+        .map(|(i, n)| (same_as[i] == i).then(|| build_node("shape", shapes, n)).transpose())
         .collect::<Result<Vec<_>>>()?;
     let mut uses = vec![0usize; nodes.len()];
     same_as.iter().for_each(|&i| uses[i] += 1);

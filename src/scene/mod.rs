@@ -4,8 +4,9 @@ pub mod build;
 pub mod desc;
 pub mod features;
 mod groups;
+pub mod registry;
 
-use crate::base::camera::Camera;
+use crate::base::camera::{Camera, FilmSize};
 use crate::base::geometry::Geometry;
 use crate::base::hit::Hit;
 use crate::base::intersectable::Intersectable;
@@ -33,6 +34,8 @@ pub struct Scene {
     pub lights: Lights,
     /// The camera, in render space.
     pub camera: Arc<dyn Camera>,
+    /// The film that the camera was placed for: a render of another size would see another part of the scene.
+    pub film: FilmSize,
     /// What camera rays that meet nothing show.
     pub background: Background,
     /// From world to render space.

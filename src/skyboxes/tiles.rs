@@ -5,8 +5,8 @@
 
 use crate::base::image_data::{ImageData, LINEAR8_TO_LINEAR, SRGB8_TO_LINEAR, Texels};
 use crate::color::Rgb;
+use crate::math::pages::Pages;
 use bytemuck::{Pod, Zeroable};
-use rayon::prelude::*;
 
 /// Texels along the side of a block.
 const SIDE: usize = 4;
@@ -24,9 +24,9 @@ struct Block8([[u8; 4]; AREA]);
 struct Block32([[f32; 3]; AREA]);
 
 enum Blocks {
-    Srgb8(Vec<Block8>),
-    Linear8(Vec<Block8>),
-    F32(Vec<Block32>),
+    Srgb8(Pages<Block8>),
+    Linear8(Pages<Block8>),
+    F32(Pages<Block32>),
 }
 
 /// Several charts of texels, all of one size.
@@ -148,9 +148,9 @@ impl Texel for [f32; 3] {
 macro_rules! with_texels {
     ($tiles:expr, $f:expr) => {
         match &$tiles.blocks {
-            Blocks::Srgb8(b) => $f(bytemuck::cast_slice::<_, [u8; 4]>(b), &SRGB8_TO_LINEAR),
-            Blocks::Linear8(b) => $f(bytemuck::cast_slice::<_, [u8; 4]>(b), &LINEAR8_TO_LINEAR),
-            Blocks::F32(b) => $f(bytemuck::cast_slice::<_, [f32; 3]>(b), &LINEAR8_TO_LINEAR),
+            Blocks::Srgb8(b) => $f(bytemuck::cast_slice::<_, [u8; 4]>(b.as_slice()), &SRGB8_TO_LINEAR),
+            Blocks::Linear8(b) => $f(bytemuck::cast_slice::<_, [u8; 4]>(b.as_slice()), &LINEAR8_TO_LINEAR),
+            Blocks::F32(b) => $f(bytemuck::cast_slice::<_, [f32; 3]>(b.as_slice()), &LINEAR8_TO_LINEAR),
         }
     };
 }
@@ -177,9 +177,13 @@ impl Tiles {
             source(row / down, x.min(width - 1), y.min(height - 1))
         };
         let blocks = match &pictures[0].texels {
-            Texels::Srgb8(_) => Blocks::Srgb8(gather(n, |b| Block8(block8(pictures, |k| place(b, k))))),
-            Texels::Linear8(_) => Blocks::Linear8(gather(n, |b| Block8(block8(pictures, |k| place(b, k))))),
-            Texels::F32(_) => Blocks::F32(gather(n, |b| {
+            Texels::Srgb8(_) => {
+                Blocks::Srgb8(Pages::from_fn(n, |b| Block8(block8(pictures, |k| place(b, k)))))
+            }
+            Texels::Linear8(_) => {
+                Blocks::Linear8(Pages::from_fn(n, |b| Block8(block8(pictures, |k| place(b, k)))))
+            }
+            Texels::F32(_) => Blocks::F32(Pages::from_fn(n, |b| {
                 Block32(std::array::from_fn(|k| {
                     let (picture, i) = place(b, k);
                     match &pictures[picture].texels {
@@ -227,15 +231,11 @@ impl Tiles {
     /// Bytes held.
     pub fn memory(&self) -> u64 {
         let bytes = match &self.blocks {
-            Blocks::Srgb8(b) | Blocks::Linear8(b) => size_of_val(&**b),
-            Blocks::F32(b) => size_of_val(&**b),
+            Blocks::Srgb8(b) | Blocks::Linear8(b) => size_of_val(b.as_slice()),
+            Blocks::F32(b) => size_of_val(b.as_slice()),
         };
         bytes as u64
     }
-}
-
-fn gather<B: Send>(n: usize, block: impl Fn(usize) -> B + Sync + Send) -> Vec<B> {
-    (0..n).into_par_iter().with_min_len(1024).map(block).collect()
 }
 
 fn block8(pictures: &[ImageData], place: impl Fn(usize) -> (usize, usize)) -> [[u8; 4]; AREA] {
@@ -263,8 +263,12 @@ fn mixed<T: Texel>(texels: &[T], curve: &[f32; 256], f: Footprint) -> Rgb {
 fn mix_slice<T: Texel>(texels: &[T], curve: &[f32; 256], footprints: &Footprints, out: &mut [Rgb]) {
     let n = out.len().min(CHUNK);
     // So few instructions a lookup that a processor has dozens of them on their way; the mixing below finds what it needs
-    // in a cache. Worth a sixth of a lookup's time even so where they all are in a cache already.
-    let touched = (0..n).fold(0, |all, i| all | texels[footprints.at[i] as usize].bits());
+    // in a cache. First and last texel: they lie in all blocks that a footprint touches, but for one of sixteen.
+    let touched = (0..n).fold(0, |all, i| {
+        let first = footprints.at[i] as usize;
+        let last = first + (footprints.right[i] + footprints.down[i]) as usize;
+        all | texels[first].bits() | texels[last].bits()
+    });
     std::hint::black_box(touched);
     for (i, out) in out[..n].iter_mut().enumerate() {
         *out = mixed(texels, curve, footprints.get(i));

@@ -26,7 +26,7 @@
 //! | call | Embree 3 | Embree 4 |
 //! |---|---|---|
 //! | `em_intersect1`, `em_occluded1` | `rtcIntersect1` ... | the same, with arguments on the stack |
-//! | `em_intersect4/8/16`, `em_occluded4/8/16` | packets with a mask of -1 (on) and 0 (off) | the same |
+//! | `em_intersect4/8/16`, `em_occluded4/8/16` | packets with a mask of -1 (on) and 0 (off), also where the CPU lacks the width | the same |
 //! | `em_intersect_stream1`, `em_occluded_stream1` | `rtcIntersect1M` ... | a loop over single rays |
 //! | `em_intersect_stream16`, `em_occluded_stream16` | `rtcIntersectNM` ... | a loop over packets |
 //! | `em_intersect_soa`, `em_occluded_soa` | `rtcIntersectNp` ... | a loop over packets |

@@ -46,15 +46,15 @@ pub fn integrator(kind: &str, params: &[(&str, f64)]) -> std::sync::Arc<dyn inte
     registry::build("integrator", integrators::REGISTRY, &node).unwrap()
 }
 
-/// Renders with the given integrator.
-pub fn render(
-    scene: &Scene,
-    integrator: std::sync::Arc<dyn integrators::Integrator>,
-    size: [u32; 2],
-    spp: u32,
-) -> Rendered {
-    let settings = RenderSettings { spp, threads: 2, ..RenderSettings::new(size) };
+/// Renders the scene's own film with the given integrator.
+pub fn render(scene: &Scene, integrator: std::sync::Arc<dyn integrators::Integrator>, spp: u32) -> Rendered {
+    let settings = RenderSettings { spp, threads: 2, ..settings(scene) };
     Renderer { integrator, settings }.render(scene, &Silent).unwrap()
+}
+
+/// Settings for the film that the scene's camera fills.
+pub fn settings(scene: &Scene) -> RenderSettings {
+    RenderSettings::new([scene.film.width, scene.film.height])
 }
 
 /// Mean radiance over the whole film and its standard error, from the tiles' replicates.

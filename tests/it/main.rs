@@ -3,7 +3,9 @@
 mod cli;
 mod common;
 mod geometry;
+mod kernels;
 mod layers;
 mod light;
+mod open_house;
 mod reference;
 mod source;

@@ -31,7 +31,7 @@ pub const MAX_PIXELS: u64 = 1 << 28;
 /// # Errors
 /// [`Error::Content`] with line and column for anything in the text that cannot be used; [`Error::File`] for files that
 /// cannot be read.
-pub fn load(path: &Path) -> Result<SceneDesc> {
+pub fn load(path: &Path, families: &Families) -> Result<SceneDesc> {
     let length = std::fs::metadata(path).map_err(|e| Error::file(path, "open", e))?.len();
     if length > MAX_BYTES {
         let message = format!("{length} bytes of scene text; {MAX_BYTES} are the most that is read");
@@ -45,7 +45,7 @@ pub fn load(path: &Path) -> Result<SceneDesc> {
             return Err(Error::content_at(path, line, 0, "this is not text in UTF-8"));
         }
     };
-    parse(path, text, &Families::registered())
+    parse(path, text, families)
 }
 
 /// Reads the text of a scene file; `path` is for messages and for the paths in it, which are relative to its folder.

@@ -1,7 +1,7 @@
 //! Rays against one triangle, in double precision.
 
 use crate::base::shape::LocalRay;
-use crate::math::bounds::{U32, gamma};
+use crate::math::bounds::{U32, UNDERFLOW, gamma};
 use glam::{DVec3, Vec3, Vec3A, Vec3Swizzles};
 
 /// A point of a triangle.
@@ -40,9 +40,18 @@ pub fn intersect(ray: &LocalRay, v: [DVec3; 3]) -> Option<f64> {
     if (e0 < 0.0 || e1 < 0.0 || e2 < 0.0) && (e0 > 0.0 || e1 > 0.0 || e2 > 0.0) {
         return None;
     }
-    let det = e0 + e1 + e2;
-    let t = (e0 * p0.z + e1 * p1.z + e2 * p2.z) / det;
-    // A zero determinant (seen edge on) leaves t NaN, which fails the comparison.
+    if e0 == 0.0 && e1 == 0.0 && e2 == 0.0 {
+        return None;
+    }
+    // The distance by the plane and not by the sheared corners: a ray that leaves a triangle in a plane of one
+    // coordinate (a floor at y = 0) starts a single step of f32 beside it, which is nothing next to the rounding of the
+    // other coordinates, but here multiplies exact zeros by those. Where the ray runs in the plane (t may
+    // be NaN), the corners bound it.
+    let Triangle { v0, n, .. } = Triangle::between(v);
+    let t = (v0 - ray.o).dot(n) / d.dot(n);
+    let near = p0.z.min(p1.z).min(p2.z);
+    let far = p0.z.max(p1.z).max(p2.z);
+    let t = t.max(near).min(far);
     (t >= ray.tnear && t <= ray.tfar).then_some(t)
 }
 
@@ -62,9 +71,13 @@ pub struct Triangle {
 impl Triangle {
     /// From single precision, without error but for differences of very unequal numbers.
     #[inline(always)]
-    pub fn new([a, b, c]: [Vec3; 3]) -> Self {
-        let v0 = a.as_dvec3();
-        let (e1, e2) = (b.as_dvec3() - v0, c.as_dvec3() - v0);
+    pub fn new(corners: [Vec3; 3]) -> Self {
+        Triangle::between(corners.map(|v| v.as_dvec3()))
+    }
+
+    #[inline(always)]
+    fn between([v0, b, c]: [DVec3; 3]) -> Self {
+        let (e1, e2) = (b - v0, c - v0);
         Triangle { v0, e1, e2, n: e1.cross(e2) }
     }
 
@@ -134,6 +147,10 @@ fn nearest_on_edges(ray: LocalRay, triangle: Triangle) -> TrianglePoint {
 /// is off by gamma(7) sum |v_k| m_k / |N|. They choose for each component the pair of edges with the smaller first
 /// term; its terms are at most 2 min(m) + |N| <= 3 min(m): 21 roundings.
 ///
+/// In a plane of one coordinate that is zero (a floor at y = 0) all of this vanishes, yet the products of a height of
+/// almost nothing do not survive: nine of them underflow, which leaves a height of 9 UNDERFLOW / |N| unseen. (By 0.5 m
+/// squares a ray would meet the floor it leaves, if its origin were but the next number above zero.)
+///
 /// Worked out in f32, but for what could underflow: the bound is generous, and where the rounding of `p` matters
 /// beside the triangle's size, the rounding of a vertex' position is added anyway.
 #[inline(always)]
@@ -143,7 +160,7 @@ pub fn test_error(v: [Vec3A; 3], p: Vec3A, n: DVec3) -> DVec3 {
     let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
     let terms = |a: Vec3A, b: Vec3A| (a.yzx() * b.zxy()).abs() + (a.zxy() * b.yzx()).abs();
     let m = terms(e1, e2).min(terms(e1, v[2] - v[1]));
-    let height = f64::from(gamma(21)) * r0.as_dvec3().dot(m.as_dvec3()) / n.length();
+    let height = (f64::from(gamma(21)) * r0.as_dvec3().dot(m.as_dvec3()) + 9.0 * UNDERFLOW) / n.length();
     // A plane through a corner cannot be further away than the corner.
     let height = (height as f32).min(r.max_element());
     (r * (2.0 * U32) + Vec3A::splat(height)).as_dvec3()

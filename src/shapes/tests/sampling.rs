@@ -144,7 +144,7 @@ fn what_is_sampled_from_outside_is_seen() {
     let mut rng = TestRng::new(12);
     for_each_placed(|name, shape| {
         // Quadrics take only the side that faces the viewer.
-        if !is_closed(name) || shape.primitive_count() > 1 {
+        if !is_closed(shape) || shape.primitive_count() > 1 {
             return;
         }
         for from in &viewers(shape)[..2] {

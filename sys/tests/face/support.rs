@@ -1,6 +1,7 @@
 //! Owners of Embree objects, generated meshes and rays.
 
 use embree_sys::*;
+use std::ffi::CStr;
 use std::ptr;
 
 /// A device, released at the end of the test.
@@ -8,10 +9,14 @@ pub struct Device(pub RTCDevice);
 
 impl Device {
     pub fn new() -> Self {
-        // SAFETY: a null configuration is the documented default.
-        let device = unsafe { rtcNewDevice(ptr::null()) };
-        assert!(!device.is_null());
-        Device(device)
+        Self::configured(c"").expect("the default device")
+    }
+
+    /// `None` if this CPU, or this build of Embree, does not know the configuration.
+    pub fn configured(config: &CStr) -> Option<Self> {
+        // SAFETY: the configuration is a C string, read during the call.
+        let device = unsafe { rtcNewDevice(config.as_ptr()) };
+        (!device.is_null()).then_some(Device(device))
     }
 
     pub fn error(&self) -> RTCError {

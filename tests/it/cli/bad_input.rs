@@ -2,12 +2,14 @@
 
 use super::folder::{Folder, QUICK, SCENE};
 use std::fs;
+use std::path::{Path, PathBuf};
 
 #[test]
 fn wrong_figures_and_names_are_refused() {
     let f = Folder::new();
     for (flags, words) in [
-        ("--spp 0", &["--spp"][..]),
+        ("--spp 0", &["--spp", "0"][..]),
+        ("--size 0x0", &["--size", "0 x 0"]),
         ("--size 0x5", &["--size", "0 x 5"]),
         ("--size 65536x65536", &["--size"]),
         ("--size 12", &["--size", "WIDTHxHEIGHT"]),
@@ -57,7 +59,28 @@ fn missing_and_unwritable_files_are_told_first() {
     f.refuses("render none.ply -o a", 2, &["a"]);
     fs::create_dir(f.path().join("dir.png")).unwrap();
     f.refuses("render none.ply -o dir.png", 3, &["dir.png"]);
-    f.refuses("render scene.xyz -o a.png", 2, &["scene.xyz"]);
+    f.refuses("render scene.xyz -o a.png", 2, &["scene.xyz", "known: toml, obj, ply"]);
+    f.refuses("render . -o a.png", 2, &["folder"]);
+    f.refuses("render scene -o a.png", 2, &["scene", "no extension", "known: toml, obj, ply"]);
+}
+
+/// A limit on the size of files, and by the same way a full disk, is an error that leaves nothing behind.
+#[test]
+#[cfg(unix)]
+fn a_picture_that_does_not_fit_is_told_and_leaves_nothing() {
+    let f = Folder::new();
+    let before = f.listing();
+    let limited =
+        "ulimit -f 8; exec \"$0\" render tri.ply -o a.exr --size 200x200 --spp 1 --sky constant --quiet";
+    let output = std::process::Command::new("sh")
+        .args(["-c", limited, env!("CARGO_BIN_EXE_skylit")])
+        .current_dir(f.path())
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(3), "{} {text}", output.status);
+    assert!(text.contains("a.exr: cannot write"), "{text}");
+    assert_eq!(f.listing(), before);
 }
 
 fn ply(corners: [&str; 4], faces: &str) -> String {
@@ -73,6 +96,10 @@ fn scenes_and_meshes_without_content_are_refused_or_repaired() {
     let f = Folder::new();
     f.write("empty.toml", "");
     f.refuses("render empty.toml -o a.png", 2, &["empty"]);
+    // A sky alone is a picture, and said to be one.
+    f.write("sky.toml", "[sky]\ntype = 'constant'");
+    let run = f.run("render sky.toml -o a.png --size 8x6 --spp 1").succeeds();
+    assert!(run.stderr.contains("no object"), "{}", run.stderr);
     f.write("empty.obj", "");
     f.refuses("render empty.obj -o a.png", 2, &["empty.obj"]);
     f.write("range.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n");
@@ -84,7 +111,7 @@ fn scenes_and_meshes_without_content_are_refused_or_repaired() {
     let run = f.run(&format!("render nan.ply -o a.png {QUICK}")).succeeds();
     assert!(run.stderr.contains("1 primitive"), "the dropped one is counted: {}", run.stderr);
     f.write("nans.ply", ply(["0 0 0", "nan 0 0", "inf 1 0", "1 1 0"], faces));
-    f.refuses("render nans.ply -o b.png", 2, &["degenerate"]);
+    f.refuses("render nans.ply -o b.png", 2, &["nans.ply", "2 primitives", "not finite"]);
     let cycle = "[groups.a]\nobjects = [{ group = 'b' }]\n[groups.b]\nobjects = [{ group = 'a' }]\n";
     f.write("cycle.toml", format!("{cycle}[[objects]]\ngroup = 'a'"));
     f.refuses("render cycle.toml -o b.png", 2, &["cycle.toml:", "a > b > a"]);
@@ -110,11 +137,20 @@ fn damaged_skies_are_refused() {
         }
     }
     let render = |sky: &str| format!("render tri.ply -o a.png --size 8x6 --spp 1 --sky {sky}");
-    for sky in ["none", "one", "five", "unequal"] {
-        f.refuses(&render(sky), 2, &[sky]);
+    for (sky, words) in [
+        ("none", "no picture"),
+        ("one", "six faces"),
+        ("five", "-Z of the six faces is missing"),
+        ("unequal", "8"),
+    ] {
+        f.refuses(&render(sky), 2, &[sky, words]);
     }
+    let empty = ["render", "tri.ply", "-o", "a.png", "--sky", ""];
+    let output = f.command("").args(empty).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(2) && text.contains("unknown sky \"\""), "{text}");
     f.write("huge.hdr", "#?RADIANCE\n\n-Y 60000 +X 60000\n12345");
-    f.refuses(&render("huge.hdr"), 2, &["huge.hdr"]);
+    f.refuses(&render("huge.hdr"), 2, &["huge.hdr", "claims 60000 x 60000"]);
     f.write("not.png", "this is no picture");
     f.refuses(&render("not.png"), 2, &["not.png"]);
     f.refuses(&render("./constant"), 3, &["constant"]);
@@ -151,6 +187,80 @@ fn truncated_files_never_crash_and_leave_nothing() {
             assert_eq!(f.listing(), before, "{command}");
         }
     }
+}
+
+fn shared(folder: &str) -> Option<PathBuf> {
+    let data = std::env::var_os("SKYLIT_DATA")
+        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
+    if data.is_dir() {
+        return Some(data.join(folder));
+    }
+    assert!(
+        std::env::var_os("SKYLIT_REQUIRE_DATA").is_none_or(|v| v != "1"),
+        "{} is no folder",
+        data.display()
+    );
+    println!("skipped: no SKYLIT_DATA");
+    None
+}
+
+/// The OBJ and PLY files of a folder of shared meshes, and of those within it.
+fn meshes(dir: &Path) -> Vec<PathBuf> {
+    let mut all = Vec::new();
+    for entry in fs::read_dir(dir).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            all.extend(meshes(&path));
+        } else if path.to_string_lossy().contains(".obj") || path.to_string_lossy().contains(".ply") {
+            all.push(path);
+        }
+    }
+    all.sort();
+    all
+}
+
+#[test]
+fn malformed_meshes_of_others_are_refused_by_name() {
+    let Some(dir) = shared("meshes/malformed") else { return };
+    let files = meshes(&dir);
+    assert!(files.len() >= 12, "{files:?}");
+    let f = Folder::new();
+    for file in files {
+        let name = file.file_name().unwrap().to_str().unwrap();
+        f.write(name, fs::read(&file).unwrap());
+        f.refuses(&format!("render {name} -o a.png {QUICK}"), 2, &[name]);
+    }
+}
+
+/// Loaders are cut at 20 places of every file in src/formats/tests.rs; here the whole program is, at some places of
+/// those that are small, as a run costs 30 ms.
+#[test]
+fn truncated_meshes_of_others_are_refused_or_rendered_by_the_program() {
+    let Some(dir) = shared("meshes") else { return };
+    let f = Folder::new();
+    let (mut seed, mut refused) = (1u64, 0);
+    for file in ["obj", "ply", "awkward-obj"].iter().flat_map(|d| meshes(&dir.join(d))) {
+        let bytes = fs::read(&file).unwrap();
+        if bytes.len() > 1 << 16 {
+            continue;
+        }
+        let name = file.file_name().unwrap().to_str().unwrap().replace(' ', "-");
+        for _ in 0..3 {
+            // Constants of Knuth's MMIX generator.
+            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            f.write(&name, &bytes[..(seed >> 33) as usize % bytes.len()]);
+            let before = f.listing();
+            let run = f.run(&format!("render {name} -o a.png {QUICK}"));
+            match run.code {
+                0 => fs::remove_file(f.path().join("a.png")).unwrap(),
+                _ => run.refuses(2, &[&name]),
+            }
+            refused += u32::from(run.code != 0);
+            assert_eq!(f.listing(), before, "{name}");
+        }
+        fs::remove_file(f.path().join(&name)).unwrap();
+    }
+    assert!(refused > 50, "{refused} cut files were refused");
 }
 
 /// A strip of 200 triangles.
