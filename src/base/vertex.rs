@@ -64,15 +64,16 @@ impl Vertex {
             Some(pl) => placed(surface, pl),
         };
         let d = ray.d.as_dvec3();
+        let length = d.length();
         let ng = ng.normalize();
-        let wo = -d / d.length();
+        let wo = -d / length;
         // Seen from a side on which the interpolated normal turns away (at silhouettes), no frame around it has the
         // viewer and the light on consistent sides: there the geometric normal stands in, and nothing turns black.
-        let ns = if ns.dot(wo) * ng.dot(wo) > 0.0 { ns.normalize() } else { ng };
+        let smooth = surface.ns != surface.ng && ns.dot(wo) * ng.dot(wo) > 0.0;
+        let ns = if smooth { ns.normalize() } else { ng };
         let p32 = p.as_vec3();
         // The rounding of p itself to f32.
         let error = error + p.abs() * UNIT_ROUNDOFF;
-        let length = d.length();
         let [dpdu, dpdv] = match placement {
             None => [surface.dpdu, surface.dpdv],
             Some(pl) => [surface.dpdu, surface.dpdv].map(|v| pl.to_render.matrix3 * v),
@@ -174,16 +175,13 @@ fn round_up(v: DVec3) -> Vec3 {
     v.as_vec3() * (1.0 + 2.0 * f32::EPSILON)
 }
 
-/// The neighbour of `x` on the side of `n`.
+/// From `x` to a neighbour on the side of `n`, the next or the one after it. By arithmetic rather than by bits: nothing
+/// here could be predicted.
 #[inline]
 fn step(x: f32, n: f32) -> f32 {
-    if n > 0.0 {
-        x.next_up()
-    } else if n < 0.0 {
-        x.next_down()
-    } else {
-        x
-    }
+    // |x| epsilon is one to two units in the last place; the smallest normal number steps off zero.
+    let away = (x.abs() * f32::EPSILON + f32::MIN_POSITIVE).copysign(n);
+    if n == 0.0 { x } else { x + away }
 }
 
 /// The shading frame: its x follows `dpdu` where that is known, so that stretched highlights do.

@@ -1,5 +1,6 @@
 //! Cameras: one file a kind, each with its registry row.
 
+mod equirectangular;
 mod frame_bounds;
 pub mod perspective;
 
@@ -9,7 +10,7 @@ use crate::base::camera::CameraSource;
 use crate::base::registry::Row;
 
 /// Every kind of camera.
-pub static REGISTRY: &[Row<dyn CameraSource>] = &[perspective::ROW];
+pub static REGISTRY: &[Row<dyn CameraSource>] = &[perspective::ROW, equirectangular::ROW];
 
 #[cfg(test)]
 mod tests;

@@ -55,6 +55,27 @@ fn rows_are_sound_and_rays_valid() {
 }
 
 #[test]
+fn an_equirectangular_picture_is_the_sphere_map_of_its_surroundings() {
+    let camera = build("camera", REGISTRY, &node("equirectangular", &Params::new()))
+        .expect("builds")
+        .place(&RenderSpace::IDENTITY, FilmSize { width: 64, height: 32 })
+        .expect("places");
+    for (x, y, expected) in [
+        (32.0, 16.0, Vec3::X),
+        (48.0, 16.0, Vec3::Z),
+        (16.0, 16.0, Vec3::NEG_Z),
+        (0.0, 16.0, Vec3::NEG_X),
+        (5.0, 0.0, Vec3::Y),
+        (40.0, 32.0, Vec3::NEG_Y),
+        (40.0, 8.0, Vec3::new(0.5, 0.5f32.sqrt(), 0.5)),
+    ] {
+        let d = rays(&*camera, &[x], &[y], &[]).get(0).d;
+        // Two functions good to 1.2e-7 each, multiplied and rounded.
+        assert!((d - expected).length() < 5e-7, "{x} {y}: {d}");
+    }
+}
+
+#[test]
 fn perspective_rays_run_where_they_should() {
     let params = Params::new()
         .with("eye", vector([5.0, 1.0, 0.0]))

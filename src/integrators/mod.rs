@@ -7,6 +7,7 @@ mod escapes;
 pub mod normals;
 pub mod path;
 mod points;
+mod surface;
 
 use crate::base::hit::HitBatch;
 use crate::base::ray::RayBatch;

@@ -2,18 +2,17 @@
 //! multiple importance sampling (Veach 1997, ch. 9), long paths end by Russian roulette.
 
 use super::escapes::Escapes;
-use super::points::{VertexPoint, VertexPoints};
-use super::{CameraBatch, FirstHit, Integrator, PathId, PathIds, PathResults, Workspace};
+use super::points::VertexPoints;
+use super::surface::Surface;
+use super::{CameraBatch, FirstHit, Integrator, PathIds, PathResults, Workspace};
 use crate::base::hit::{HitBatch, NO_PRIMITIVE};
 use crate::base::light::{PathEnd, Receiver};
-use crate::base::material::{Material, Prepared};
+use crate::base::material::Prepared;
 use crate::base::ray::{Coherence, RayBatch};
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::base::vertex::Vertex;
 use crate::color::Rgb;
 use crate::error::Result;
-use crate::sampler::ray_key;
-use crate::sampler::{Dim, Slot};
 use crate::sampling::mis::power;
 use crate::scene::Scene;
 use glam::Vec3;
@@ -62,38 +61,38 @@ pub struct PathTracer {
 
 /// A path on its way.
 #[derive(Clone, Copy)]
-struct PathState {
+pub(super) struct PathState {
     /// Throughput.
-    beta: Rgb,
+    pub beta: Rgb,
     /// Density per solid angle of the direction travelled; infinite where no light sample competes.
-    pdf: f32,
+    pub pdf: f32,
     /// Where the ray left, for the density of light samples.
-    from: Receiver,
+    pub from: Receiver,
     /// Index into the block.
-    index: u32,
+    pub index: u32,
 }
 
 /// A light sample that waits for its shadow ray.
 #[derive(Clone, Copy)]
-struct Pending {
+pub(super) struct Pending {
     /// What the path brings: radiance, or what radiance is to be multiplied by.
-    value: Rgb,
+    pub value: Rgb,
     /// Index into the block.
-    index: u32,
+    pub index: u32,
     /// The light that has to be asked for the radiance, if it did not say.
-    ask: Option<u32>,
+    pub ask: Option<u32>,
 }
 
 /// Path states, kept from block to block.
 #[derive(Default)]
 pub struct PathScratch {
     states: Vec<PathState>,
-    next: Vec<PathState>,
-    pending: Vec<Pending>,
+    pub(super) next: Vec<PathState>,
+    pub(super) pending: Vec<Pending>,
     escapes: Escapes,
     /// Which rays of the depth met something.
     hits: Vec<u32>,
-    points: VertexPoints,
+    pub(super) points: VertexPoints,
 }
 
 impl Integrator for PathTracer {
@@ -125,10 +124,10 @@ impl Integrator for PathTracer {
 }
 
 /// What is the same for all paths of a depth.
-struct Block<'a> {
-    scene: &'a Scene,
-    ids: &'a PathIds,
-    depth: u32,
+pub(super) struct Block<'a> {
+    pub scene: &'a Scene,
+    pub ids: &'a PathIds,
+    pub depth: u32,
 }
 
 impl PathTracer {
@@ -160,23 +159,25 @@ impl PathTracer {
         }
         paths.sort_out(&work.hits, rays);
         paths.draw(&block, self.light_sampling, |_, i| i);
-        for k in 0..paths.hits.len() {
-            let i = paths.hits[k] as usize;
-            let Some(hit) = work.hits.get(i) else { continue };
-            let v = scene.vertex(&rays.get(i), hit, batch.spread);
-            out.alpha[i] = 1.0;
-            if batch.want_first {
-                out.first[i] = Some(first_hit(scene, v));
+        let mut surfaces = Vec::with_capacity(Surface::AT_ONCE);
+        for first in (0..paths.hits.len()).step_by(Surface::AT_ONCE) {
+            surfaces.clear();
+            for (k, &i) in paths.chunk(first) {
+                let i = i as usize;
+                let Some(hit) = work.hits.get(i) else { continue };
+                let v = scene.vertex(&rays.get(i), hit, batch.spread);
+                let from = Receiver { p: v.p, ng: Vec3::ZERO, ns: Vec3::ZERO };
+                let state = PathState { beta: Rgb::WHITE, pdf: f32::INFINITY, from, index: i as u32 };
+                surfaces.push(Surface::new(scene, v, state, k));
             }
-            let state = PathState {
-                beta: Rgb::WHITE,
-                pdf: f32::INFINITY,
-                from: Receiver { p: v.p, ng: Vec3::ZERO, ns: Vec3::ZERO },
-                index: i as u32,
-            };
-            block.add_emission(&state, &v, rays.direction(i), out);
-            let point = paths.points.get(k);
-            self.scatter(&block, &state, &v, &point, work, paths);
+            for s in &surfaces {
+                out.alpha[s.state.index as usize] = 1.0;
+                if batch.want_first {
+                    out.first[s.state.index as usize] = Some(first_hit(scene, s.v));
+                }
+                block.add_emission(&s.state, &s.v, -s.v.wo, out);
+            }
+            self.scatter(&block, &mut surfaces, work, paths);
         }
         paths.escapes.add_background(scene, &mut out.li);
         block.resolve_shadows(work, paths, out);
@@ -199,92 +200,25 @@ impl PathTracer {
         if goes_on {
             paths.draw(block, self.light_sampling, |states, i| states[i as usize].index);
         }
-        for k in 0..paths.hits.len() {
-            let i = paths.hits[k] as usize;
-            let Some(hit) = work.hits.get(i) else { continue };
-            let state = paths.states[i];
-            let v = block.scene.vertex(&rays.get(i), hit, 0.0);
-            block.add_emission(&state, &v, rays.direction(i), out);
+        let mut surfaces = Vec::with_capacity(Surface::AT_ONCE);
+        for first in (0..paths.hits.len()).step_by(Surface::AT_ONCE) {
+            surfaces.clear();
+            for (k, &i) in paths.chunk(first) {
+                let i = i as usize;
+                let Some(hit) = work.hits.get(i) else { continue };
+                let v = block.scene.vertex(&rays.get(i), hit, 0.0);
+                surfaces.push(Surface::new(block.scene, v, paths.states[i], k));
+            }
+            for s in &surfaces {
+                block.add_emission(&s.state, &s.v, -s.v.wo, out);
+            }
             if goes_on {
-                let point = paths.points.get(k);
-                self.scatter(block, &state, &v, &point, work, paths);
+                self.scatter(block, &mut surfaces, work, paths);
             }
         }
         block.add_escapes(paths, out);
         block.resolve_shadows(work, paths, out);
     }
-
-    /// One surface: a light sample, then the direction in which the path goes on.
-    fn scatter(
-        &self,
-        block: &Block,
-        state: &PathState,
-        v: &Vertex,
-        point: &VertexPoint,
-        work: &mut Workspace,
-        paths: &mut PathScratch,
-    ) {
-        let material = block.scene.material(v);
-        if material.is_black() {
-            return;
-        }
-        let mut prepared = Prepared::default();
-        material.prepare(v, &mut prepared);
-        let surface = SurfacePoint { v, material, prepared: &prepared, wo: v.frame.to_local(v.wo), point };
-        let lit = self.light_sampling && !material.is_delta();
-        if lit {
-            block.sample_light(state, &surface, work, paths);
-        }
-        self.extend(block, state, &surface, lit, work, paths);
-    }
-
-    fn extend(
-        &self,
-        block: &Block,
-        state: &PathState,
-        s: &SurfacePoint,
-        lit: bool,
-        work: &mut Workspace,
-        paths: &mut PathScratch,
-    ) {
-        let id = &s.point.id;
-        let roulette = block.depth >= self.roulette_depth && block.depth < self.max_depth;
-        let lobe = if roulette || s.material.picks_lobe() {
-            id.sampler.get_2d(id.index, Dim::at(block.depth, Slot::LobeAndRoulette))
-        } else {
-            [0.0; 2]
-        };
-        let Some(b) = s.material.sample(s.prepared, s.wo, s.point.bsdf, lobe[0]) else { return };
-        let wi = s.v.frame.to_world(b.wi);
-        let mut beta = state.beta * b.weight;
-        if beta.is_black() || !s.v.is_consistent(wi) {
-            return;
-        }
-        if roulette {
-            // Survival by throughput; never certain, so that no path of a white scene lives for ever.
-            let q = beta.max_component().min(0.95);
-            if lobe[1] >= q {
-                return;
-            }
-            beta = beta / q;
-        }
-        work.next.push(&s.v.spawn(wi, key(id, block.depth + 1)));
-        paths.next.push(PathState {
-            beta,
-            pdf: if b.delta || !lit { f32::INFINITY } else { b.pdf },
-            from: s.v.receiver(),
-            index: state.index,
-        });
-    }
-}
-
-/// A vertex with its material read.
-struct SurfacePoint<'a> {
-    v: &'a Vertex,
-    material: &'a dyn Material,
-    prepared: &'a Prepared,
-    wo: Vec3,
-    point: &'a VertexPoint,
 }
 
 impl PathScratch {
@@ -306,6 +240,11 @@ impl PathScratch {
         self.points.draw(block.ids, paths, block.depth, with_light);
     }
 
+    /// The next few hits from `first` on, with their numbers.
+    fn chunk(&self, first: usize) -> impl Iterator<Item = (usize, &u32)> {
+        self.hits.iter().enumerate().skip(first).take(Surface::AT_ONCE)
+    }
+
     fn begin(&mut self, next: &mut RayBatch, shadow: &mut RayBatch) {
         self.next.clear();
         self.pending.clear();
@@ -316,40 +255,6 @@ impl PathScratch {
 }
 
 impl Block<'_> {
-    /// Next-event estimation: one light, one point on it, one shadow ray, unless nothing can arrive.
-    fn sample_light(
-        &self,
-        state: &PathState,
-        s: &SurfacePoint,
-        work: &mut Workspace,
-        paths: &mut PathScratch,
-    ) {
-        let lights = &self.scene.lights;
-        let id = &s.point.id;
-        let pick = if self.scene.features.many_lights {
-            id.sampler.get_1d(id.index, Dim::at(self.depth, Slot::LightPick))
-        } else {
-            0.0
-        };
-        let at = s.v.receiver();
-        let Some(chosen) = lights.sampler.sample(&at, pick) else { return };
-        let light = &lights.list[chosen.light as usize];
-        let Some(l) = light.sample_li(&at, s.point.light) else { return };
-        if !s.v.is_consistent(l.wi) {
-            return;
-        }
-        let e = s.material.eval(s.prepared, s.wo, s.v.frame.to_local(l.wi));
-        let value = state.beta * e.f_cos * l.li.unwrap_or(Rgb::WHITE);
-        if value.is_black() {
-            return;
-        }
-        let pdf = chosen.pmf * l.pdf;
-        let weight = if l.delta { 1.0 } else { power(pdf, e.pdf) };
-        work.shadow.push(&s.v.spawn_to(l.wi, l.dist, key(id, self.depth) ^ SHADOW_KEY));
-        let ask = l.li.is_none().then_some(chosen.light);
-        paths.pending.push(Pending { value: value * (weight / pdf), index: state.index, ask });
-    }
-
     /// Traces the shadow rays of this depth and adds what arrives.
     fn resolve_shadows(&self, work: &mut Workspace, paths: &mut PathScratch, out: &mut PathResults) {
         if work.shadow.is_empty() {
@@ -424,14 +329,6 @@ impl Block<'_> {
         let weight = if from.is_some() { power(state.pdf, e.pdf) } else { 1.0 };
         out.li[state.index as usize] += state.beta * e.le * weight;
     }
-}
-
-/// Sets the keys of shadow rays apart from those of scattered rays.
-const SHADOW_KEY: u32 = 0x9e37_79b9;
-
-#[inline]
-fn key(id: &PathId, depth: u32) -> u32 {
-    ray_key(id.key, id.index, depth)
 }
 
 /// The record of a first surface for AOVs.

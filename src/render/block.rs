@@ -118,9 +118,10 @@ impl Worker {
         self.layers.reset(rect);
         self.batch.spread = job.scene.camera.pixel_spread();
         self.batch.want_first = !job.settings.aovs.is_empty();
+        let indices: [Range<u32>; REPLICATES] =
+            std::array::from_fn(|replicate| replicate_indices(&range, replicate as u32));
         for (x, y) in rect.pixels() {
-            for replicate in 0..REPLICATES as u32 {
-                let indices = replicate_indices(&range, replicate);
+            for (replicate, indices) in (0..).zip(&indices).filter(|(_, indices)| !indices.is_empty()) {
                 let mut first = indices.start;
                 while first < indices.end {
                     let room = BATCH - self.film_x.len();

@@ -8,7 +8,7 @@ mod tile;
 
 pub use tile::{FilmSample, FilmTile};
 
-use super::fixed::mean_of;
+use super::fixed::{mean_of, mean_of_both, mean_of_many};
 use crate::base::pixel_rect::PixelRect;
 use crate::color::Rgb;
 use crate::image::picture::{Picture, SampleKind};
@@ -55,11 +55,11 @@ impl PixelSums {
 
     fn mean(&self) -> [f64; 3] {
         let n = self.count();
-        std::array::from_fn(|c| mean_of(i128::from(self.halves[0][c]) + i128::from(self.halves[1][c]), n))
+        std::array::from_fn(|c| mean_of_both([self.halves[0][c], self.halves[1][c]], n))
     }
 
     fn alpha(&self) -> f32 {
-        mean_of(i128::from(self.alpha), self.count()) as f32
+        mean_of(self.alpha, self.count()) as f32
     }
 
     /// See [`Film::variance`]; `None` where one half has no sample.
@@ -71,7 +71,7 @@ impl PixelSums {
         let n = (a + b) as f64;
         let weight = (a as f64 / n) * (b as f64 / n);
         Some(std::array::from_fn(|c| {
-            let d = mean_of(i128::from(self.halves[0][c]), a) - mean_of(i128::from(self.halves[1][c]), b);
+            let d = mean_of(self.halves[0][c], a) - mean_of(self.halves[1][c], b);
             weight * d * d
         }))
     }
@@ -108,7 +108,7 @@ impl ReplicateSum {
     }
 
     fn mean(&self) -> f64 {
-        mean_of(self.luminance, self.count) / LUMINANCE_WEIGHTS.iter().sum::<i64>() as f64
+        mean_of_many(self.luminance, self.count) / LUMINANCE_WEIGHTS.iter().sum::<i64>() as f64
     }
 }
 

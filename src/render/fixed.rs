@@ -64,9 +64,29 @@ pub(super) fn quantise_small<const N: usize>(values: [f32; N]) -> Option<[i64; N
 
 /// `steps / (2^24 count)`; 0 where nothing was counted.
 #[inline]
-pub fn mean_of(steps: i128, count: u64) -> f64 {
-    // A conversion from 128 bits is a library call, ten times slower than one from 64.
-    let sum = i64::try_from(steps).map_or_else(|_| steps as f64, |s| s as f64);
+pub fn mean_of(steps: i64, count: u64) -> f64 {
+    mean(steps as f64, count)
+}
+
+/// As [`mean_of`], of a sum of two. A conversion from 128 bits is a library call, ten times slower than one from 64, so
+/// it is kept for sums that need it.
+#[inline]
+pub fn mean_of_both([a, b]: [i64; 2], count: u64) -> f64 {
+    match a.checked_add(b) {
+        Some(sum) => mean(sum as f64, count),
+        None => mean_of_many(i128::from(a) + i128::from(b), count),
+    }
+}
+
+/// As [`mean_of`], of a sum of any size.
+#[cold]
+#[inline(never)]
+pub fn mean_of_many(steps: i128, count: u64) -> f64 {
+    mean(steps as f64, count)
+}
+
+#[inline]
+fn mean(sum: f64, count: u64) -> f64 {
     if count == 0 { 0.0 } else { sum / (STEPS_PER_UNIT * count as f64) }
 }
 
@@ -163,7 +183,7 @@ impl Accumulator {
     }
 
     fn mean_at(&self, at: usize, channel: usize) -> f32 {
-        mean_of(i128::from(self.sums[at * self.channels + channel]), u64::from(self.counts[at])) as f32
+        mean_of(self.sums[at * self.channels + channel], u64::from(self.counts[at])) as f32
     }
 
     /// Appends its means to a picture of the window's size, one plane for each name.

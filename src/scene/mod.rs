@@ -144,6 +144,8 @@ impl Lights {
     /// Density per solid angle with which light sampling from `from` finds `end` on `light`, choice of light included.
     #[inline]
     pub fn pdf(&self, light: u32, end: &PathEnd, from: &Receiver) -> f32 {
-        self.sampler.pmf(from, light) * self.list[light as usize].pdf_li(from, end)
+        // One light needs no choice.
+        let pmf = if self.list.len() == 1 { 1.0 } else { self.sampler.pmf(from, light) };
+        pmf * self.list[light as usize].pdf_li(from, end)
     }
 }

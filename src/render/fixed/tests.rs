@@ -70,7 +70,7 @@ fn mean_is_within_half_a_step() {
     let samples: Vec<f32> = (0..1000).map(|_| rng.f32() * 1e-4).collect();
     samples.iter().for_each(|&v| assert!(sums.add(0, 0, [v])));
     let exact = samples.iter().map(|&v| f64::from(v)).sum::<f64>() / 1000.0;
-    let mean = mean_of(i128::from(sums.sums[0]), 1000);
+    let mean = mean_of(sums.sums[0], 1000);
     // Each value moves by at most half a step; the f64 sums here err by 1e-16.
     assert!((mean - exact).abs() <= 0.5 / STEPS_PER_UNIT + 1e-15, "{mean} {exact}");
     assert_eq!(sums.mean(0, 0, 0), mean as f32);

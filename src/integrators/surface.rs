@@ -1,0 +1,159 @@
+//! What happens at the surface points of one depth: a light sample each, then the direction in which the path goes on.
+//!
+//! A few points are worked on at once, stage by stage: within a stage nothing waits for the point before, so that a
+//! processor fills one point's waiting (for memory, for a division) with the next one's work.
+
+use super::PathId;
+use super::Workspace;
+use super::path::{Block, PathScratch, PathState, PathTracer, Pending};
+use super::points::VertexPoint;
+use crate::base::light::{ChosenLight, LightSample, Receiver};
+use crate::base::material::{Material, Prepared};
+use crate::base::vertex::Vertex;
+use crate::color::Rgb;
+use crate::sampler::{Dim, Slot, ray_key};
+use crate::sampling::mis::power;
+use crate::scene::Scene;
+use glam::Vec3;
+
+/// A surface point of a path, with its material read.
+pub(super) struct Surface<'a> {
+    /// The point.
+    pub v: Vertex,
+    /// The path that met it.
+    pub state: PathState,
+    /// Its number among the hits of the depth.
+    number: usize,
+    material: &'a dyn Material,
+    prepared: Prepared,
+    /// Local direction to the viewer.
+    wo: Vec3,
+    receiver: Receiver,
+    lit: Option<(ChosenLight, LightSample)>,
+}
+
+impl<'a> Surface<'a> {
+    /// Points worked on at once: few enough for the first-level cache.
+    pub const AT_ONCE: usize = 16;
+
+    /// A point whose material is still to be read.
+    #[inline]
+    pub fn new(scene: &'a Scene, v: Vertex, state: PathState, number: usize) -> Self {
+        let material = scene.material(&v);
+        let (wo, receiver) = (v.frame.to_local(v.wo), v.receiver());
+        Surface { v, state, number, material, prepared: Prepared::default(), wo, receiver, lit: None }
+    }
+}
+
+impl PathTracer {
+    /// Puts out shadow rays, and the rays of the next depth.
+    pub(super) fn scatter(
+        &self,
+        block: &Block,
+        surfaces: &mut Vec<Surface>,
+        work: &mut Workspace,
+        paths: &mut PathScratch,
+    ) {
+        surfaces.retain(|s| !s.material.is_black());
+        for s in surfaces.iter_mut() {
+            s.material.prepare(&s.v, &mut s.prepared);
+        }
+        if self.light_sampling {
+            for s in surfaces.iter_mut().filter(|s| !s.material.is_delta()) {
+                s.lit = block.sample_light(&s.receiver, &paths.points.get(s.number));
+            }
+            for s in surfaces.iter() {
+                if let Some((chosen, l)) = &s.lit {
+                    block.connect(s, *chosen, l, work, paths);
+                }
+            }
+        }
+        for s in surfaces.iter() {
+            self.extend(block, s, work, paths);
+        }
+    }
+
+    /// The direction in which a path goes on, if it does.
+    fn extend(&self, block: &Block, s: &Surface, work: &mut Workspace, paths: &mut PathScratch) {
+        let VertexPoint { id, bsdf, .. } = paths.points.get(s.number);
+        let roulette = block.depth >= self.roulette_depth && block.depth < self.max_depth;
+        let lobe = if roulette || s.material.picks_lobe() {
+            id.sampler.get_2d(id.index, Dim::at(block.depth, Slot::LobeAndRoulette))
+        } else {
+            [0.0; 2]
+        };
+        let Some(b) = s.material.sample(&s.prepared, s.wo, bsdf, lobe[0]) else { return };
+        let wi = s.v.frame.to_world(b.wi);
+        let mut beta = s.state.beta * b.weight;
+        if beta.is_black() || !s.v.is_consistent(wi) {
+            return;
+        }
+        if roulette {
+            // Survival by throughput; never certain, so that no path of a white scene lives for ever.
+            let q = beta.max_component().min(0.95);
+            if lobe[1] >= q {
+                return;
+            }
+            beta = beta / q;
+        }
+        work.next.push(&s.v.spawn(wi, key(&id, block.depth + 1)));
+        // Light sampling competes wherever it is tried at all, also where it found nothing this time.
+        let competes = self.light_sampling && !s.material.is_delta() && !b.delta;
+        paths.next.push(PathState {
+            beta,
+            pdf: if competes { b.pdf } else { f32::INFINITY },
+            from: s.receiver,
+            index: s.state.index,
+        });
+    }
+}
+
+impl Block<'_> {
+    /// One light and one point on it, unless nothing can arrive.
+    #[inline]
+    fn sample_light(&self, at: &Receiver, point: &VertexPoint) -> Option<(ChosenLight, LightSample)> {
+        let (lights, id) = (&self.scene.lights, &point.id);
+        let chosen = if self.scene.features.many_lights {
+            let pick = id.sampler.get_1d(id.index, Dim::at(self.depth, Slot::LightPick));
+            lights.sampler.sample(at, pick)?
+        } else {
+            ChosenLight { light: 0, pmf: 1.0 }
+        };
+        let sample = lights.list.get(chosen.light as usize)?.sample_li(at, point.light)?;
+        Some((chosen, sample))
+    }
+
+    /// A shadow ray to what was sampled of a light.
+    #[inline]
+    fn connect(
+        &self,
+        s: &Surface,
+        chosen: ChosenLight,
+        l: &LightSample,
+        work: &mut Workspace,
+        paths: &mut PathScratch,
+    ) {
+        if !s.v.is_consistent(l.wi) {
+            return;
+        }
+        let e = s.material.eval(&s.prepared, s.wo, s.v.frame.to_local(l.wi));
+        let value = s.state.beta * e.f_cos * l.li.unwrap_or(Rgb::WHITE);
+        if value.is_black() {
+            return;
+        }
+        let pdf = chosen.pmf * l.pdf;
+        let weight = if l.delta { 1.0 } else { power(pdf, e.pdf) };
+        let id = paths.points.get(s.number).id;
+        work.shadow.push(&s.v.spawn_to(l.wi, l.dist, key(&id, self.depth) ^ SHADOW_KEY));
+        let ask = l.li.is_none().then_some(chosen.light);
+        paths.pending.push(Pending { value: value * (weight / pdf), index: s.state.index, ask });
+    }
+}
+
+/// Sets the keys of shadow rays apart from those of scattered rays.
+const SHADOW_KEY: u32 = 0x9e37_79b9;
+
+#[inline]
+fn key(id: &PathId, depth: u32) -> u32 {
+    ray_key(id.key, id.index, depth)
+}
