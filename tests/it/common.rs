@@ -2,6 +2,7 @@
 
 use skylit::base::intersectable::{KernelMode, KernelOptions};
 use skylit::base::registry::{self, Node, Params, Value};
+use skylit::color::Rgb;
 use skylit::integrators;
 use skylit::render::settings::RenderSettings;
 use skylit::render::{Rendered, Renderer, Silent};
@@ -57,7 +58,7 @@ pub fn settings(scene: &Scene) -> RenderSettings {
     RenderSettings::new([scene.film.width, scene.film.height])
 }
 
-/// Mean radiance over the whole film and its standard error, from the tiles' replicates.
+/// Mean radiance over the whole film and its standard error, from the pixels' half-buffers.
 pub struct Mean {
     /// Mean luminance.
     pub value: f64,
@@ -65,18 +66,19 @@ pub struct Mean {
     pub error: f64,
 }
 
-/// The mean of a film's luminance with its standard error.
+/// The mean of a film's luminance with its standard error. Pixels are independent of each other, and each brings one
+/// degree of freedom: hundreds of them, where tiles would bring one or two.
 pub fn mean(rendered: &Rendered) -> Mean {
     let film = &rendered.film;
-    let (mut sum, mut variance, mut area) = (0.0, 0.0, 0.0);
-    for tile in film.tiles() {
-        let e = film.tile_estimate(tile.x0, tile.y0).expect("at least two replicates have samples");
-        let a = tile.area() as f64;
-        sum += a * e.mean;
-        variance += a * a * e.variance;
-        area += a;
+    let variances = film.variance(0).expect("both halves of some pixel have samples");
+    let (mut sum, mut variance, n) = (0.0, 0.0, film.window().area() as f64);
+    for (i, (x, y)) in film.window().pixels().enumerate() {
+        sum += f64::from(film.mean(x, y).luminance());
+        // Channels may go together; no luminance spreads more than if they all do.
+        let spread = Rgb::from([0, 1, 2].map(|c| variances[c][i].sqrt()));
+        variance += f64::from(spread.luminance()).powi(2);
     }
-    Mean { value: sum / area, error: variance.sqrt() / area }
+    Mean { value: sum / n, error: variance.sqrt() / n }
 }
 
 /// Asserts that a mean equals an expected value within `sigmas` standard errors plus a systematic part.
