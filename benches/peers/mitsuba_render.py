@@ -7,10 +7,16 @@
 SKY.exr is equirectangular in skylit's convention (the middle column looks along +x); skylit writes such a picture of
 any sky with the camera type "equirectangular" (see benches/README.md). Times go to stdout as JSON: `first` includes
 the compilation of the LLVM variants' kernel, `render` is the median of the later runs.
+
+With --against 'skylit render ... --stats FILE.json' that command is run after each of the later runs, so that the two
+alternate on one machine, and its own time for rendering (not for loading) is set beside Mitsuba's: `ratio` is the
+median of the pairs.
 """
 import argparse
 import json
+import shlex
 import statistics
+import subprocess
 import time
 
 import numpy as np
@@ -37,6 +43,7 @@ def arguments():
     p.add_argument("--look-at", default="0,0,0")
     p.add_argument("--fov", type=float, default=60.0)
     p.add_argument("--fit", type=float, help="centre the mesh by its bounds and scale its longest side to this")
+    p.add_argument("--against", help="a skylit command with --stats, to alternate with")
     p.add_argument("--rotate-y", type=float, default=0.0, help="degrees, after --fit")
     return p.parse_args()
 
@@ -100,6 +107,13 @@ def scene(mi, a):
     }
 
 
+def other_seconds(command):
+    words = shlex.split(command)
+    subprocess.run(words, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    with open(words[words.index("--stats") + 1]) as f:
+        return json.load(f)["seconds"]["render"]
+
+
 def main():
     a = arguments()
     import drjit as dr
@@ -111,7 +125,7 @@ def main():
     start = time.perf_counter()
     built = mi.load_dict(scene(mi, a))
     load = time.perf_counter() - start
-    times = []
+    times, others = [], []
     image = None
     for i in range(a.runs + 1):
         start = time.perf_counter()
@@ -119,6 +133,8 @@ def main():
         dr.eval(image)
         dr.sync_thread()
         times.append(time.perf_counter() - start)
+        if a.against and i > 0:
+            others.append(other_seconds(a.against))
     mi.Bitmap(image).write(a.output)
     later = times[1:] or times
     print(
@@ -134,6 +150,8 @@ def main():
                 "first": times[0],
                 "render": statistics.median(later),
                 "runs": times,
+                "skylit": others,
+                "ratio": statistics.median(m / o for m, o in zip(later, others)) if others else None,
             }
         )
     )

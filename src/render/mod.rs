@@ -82,6 +82,11 @@ impl Renderer {
     /// the clock allowed). Errors on bad settings and on a failure inside a kernel's callbacks.
     pub fn render(&self, scene: &Scene, progress: &dyn Progress) -> Result<Rendered> {
         self.settings.check()?;
+        let placed = [scene.film.width, scene.film.height];
+        if self.settings.size != placed {
+            let message = format!("the camera was placed for a film of {placed:?}, not {:?}", self.settings.size);
+            return Err(Error::Usage(message));
+        }
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(self.settings.threads.max(1))
             .build()
