@@ -84,7 +84,8 @@ impl Renderer {
         self.settings.check()?;
         let placed = [scene.film.width, scene.film.height];
         if self.settings.size != placed {
-            let message = format!("the camera was placed for a film of {placed:?}, not {:?}", self.settings.size);
+            let message =
+                format!("the camera was placed for a film of {placed:?}, not {:?}", self.settings.size);
             return Err(Error::Usage(message));
         }
         let pool = rayon::ThreadPoolBuilder::new()
