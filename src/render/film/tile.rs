@@ -114,9 +114,8 @@ impl FilmTile {
         (y.wrapping_sub(self.rect.y0) * TILE_SIDE + x.wrapping_sub(self.rect.x0)) as usize
     }
 
-    /// Adds one finite sample of replicate `replicate` (below [`REPLICATES`]) to a pixel inside. The caller
-    /// checks [`FilmSample::is_finite`] and calls [`FilmTile::drop_sample`] otherwise, where it can also tell
-    /// which sample it was.
+    /// Adds one sample of replicate `replicate` (below [`REPLICATES`]) to a pixel inside; it must be finite
+    /// ([`FilmSample::is_finite`]).
     #[inline]
     pub fn add(&mut self, x: u32, y: u32, replicate: usize, sample: FilmSample) {
         debug_assert!(sample.is_finite(), "non-finite sample at ({x}, {y})");
@@ -156,12 +155,6 @@ impl FilmTile {
         }
         self.dropped += dropped as u64;
         dropped
-    }
-
-    /// Counts a sample that is left out because it is not finite.
-    #[cold]
-    pub fn drop_sample(&mut self) {
-        self.dropped += 1;
     }
 
     #[inline]
