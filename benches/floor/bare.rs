@@ -8,11 +8,14 @@ use std::ptr;
 /// Rays a call, as in skylit's kernel.
 const CALL: usize = 1024;
 
+/// Positions, padded, and indices of a mesh.
+type Arrays = (Vec<[f32; 3]>, Vec<[u32; 3]>);
+
 /// An Embree scene of all meshes of the root group, and what it points into.
 pub struct Bare {
     device: RTCDevice,
     scene: RTCScene,
-    _arrays: Vec<(Vec<[f32; 3]>, Vec<[u32; 3]>)>,
+    _arrays: Vec<Arrays>,
 }
 
 // SAFETY: a committed scene may be queried from any thread (API manual, rtcIntersect1).
