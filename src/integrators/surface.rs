@@ -1,7 +1,7 @@
 //! What happens at the surface points of one depth: a light sample each, then the direction in which the path goes on.
 //!
-//! A few points are worked on at once, stage by stage: within a stage nothing waits for the point before, so that a
-//! processor fills one point's waiting (for memory, for a division) with the next one's work.
+//! A few points are worked on at once, stage by stage: the form that lights and shapes with a batch of their own would
+//! need. By itself it is no faster than one point after the other (measured).
 
 use super::PathId;
 use super::Workspace;

@@ -1,6 +1,5 @@
 //! Memory for large tables that are read at random. With pages of 4 KB such a read misses the processor's address
-//! cache almost always, and on virtual machines finding the page costs more than the read itself; so the system is asked
-//! for large pages where it has them.
+//! cache almost always; so the system is asked for large pages where it has them.
 
 use bytemuck::Pod;
 use memmap2::MmapMut;
@@ -17,7 +16,7 @@ pub struct Pages<T> {
 }
 
 enum Store {
-    /// Words of eight bytes; small tables, and systems that refuse.
+    /// Small tables, and systems that refuse.
     Heap(Vec<Line>),
     Mapped(MmapMut),
 }
