@@ -4,6 +4,7 @@ use crate::base::hit::{Hit, HitBatch};
 use crate::base::ray::{Coherence, Ray, RayBatch};
 use crate::error::Result;
 use crate::math::aabb::Aabb;
+use crate::math::simd::Level;
 
 /// Anything a ray can be tested against. Queries may come from many threads at once; a ray that is not valid
 /// ([`Ray::is_valid`]) is a miss.
@@ -31,6 +32,11 @@ pub trait Intersectable: Send + Sync {
         blocked.extend((0..rays.len()).map(|i| self.occluded(&rays.get(i))));
     }
 
+    /// What the kernel does to answer for one ray, by its form for single rays; none where it cannot count.
+    fn visits(&self, _ray: &Ray, _query: QueryKind) -> Option<Visits> {
+        None
+    }
+
     /// Bytes that the acceleration structure holds beyond the geometry it was given.
     fn memory(&self) -> u64;
 
@@ -41,6 +47,34 @@ pub trait Intersectable: Send + Sync {
     /// end of each block and then fails the render: a query itself has no way to.
     fn take_failure(&self) -> Result<()> {
         Ok(())
+    }
+}
+
+/// What is asked of a ray.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum QueryKind {
+    /// The closest hit.
+    Closest,
+    /// Any hit.
+    Any,
+}
+
+/// What a kernel did for rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Visits {
+    /// Inner nodes opened.
+    pub nodes: u64,
+    /// Leaves opened.
+    pub leaves: u64,
+    /// Primitives tested, all lanes of a leaf counted that hold one.
+    pub primitives: u64,
+}
+
+impl std::ops::AddAssign for Visits {
+    fn add_assign(&mut self, o: Visits) {
+        self.nodes += o.nodes;
+        self.leaves += o.leaves;
+        self.primitives += o.primitives;
     }
 }
 
@@ -75,4 +109,6 @@ pub struct KernelOptions {
     pub mode: KernelMode,
     /// Threads for the build; 0 means all.
     pub threads: usize,
+    /// The instruction set of hand-written kernels; none means [`Level::chosen`]. Changes no answer.
+    pub simd: Option<Level>,
 }

@@ -224,6 +224,6 @@ impl KernelArgs {
             Some(ModeArg::Robust) | None => KernelMode::Robust,
         };
         let backend = self.backend.clone().unwrap_or_else(|| "auto".into());
-        BuildOptions { backend, kernel: KernelOptions { quality, mode, threads } }
+        BuildOptions { backend, kernel: KernelOptions { quality, mode, threads, simd: None } }
     }
 }

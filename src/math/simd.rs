@@ -6,11 +6,87 @@
 //! floating-point operations nor contracts a multiplication and an addition into one instruction (Rust never
 //! does unless `mul_add` is written), so **the bits are the same on all paths**.
 //!
-//! `SKYLIT_SIMD=scalar` in the environment forces the baseline.
+//! `SKYLIT_SIMD` in the environment forces a [`Level`] for the whole program: `portable`, `sse4.2`, `avx2`, `avx512`.
 
+use crate::error::{Error, Result, unknown_name};
 use std::sync::OnceLock;
 
 use pulp::{Arch, Scalar, Simd, WithSimd};
+
+/// Instruction sets that hand-written code exists for, from the least to the best.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Level {
+    /// Plain Rust for whatever the program was compiled for.
+    Portable,
+    /// SSE up to 4.2.
+    Sse42,
+    /// AVX2 with FMA.
+    Avx2,
+    /// AVX-512 F, VL, DQ and BW.
+    Avx512,
+}
+
+/// The variable that forces a level.
+pub const VARIABLE: &str = "SKYLIT_SIMD";
+
+impl Level {
+    /// All of them.
+    pub const ALL: [Level; 4] = [Level::Portable, Level::Sse42, Level::Avx2, Level::Avx512];
+
+    /// Its name in [`VARIABLE`] and in records.
+    pub fn name(self) -> &'static str {
+        match self {
+            Level::Portable => "portable",
+            Level::Sse42 => "sse4.2",
+            Level::Avx2 => "avx2",
+            Level::Avx512 => "avx512",
+        }
+    }
+
+    /// Whether this processor has it.
+    pub fn is_available(self) -> bool {
+        #[cfg(target_arch = "x86_64")]
+        let has = match self {
+            Level::Portable => true,
+            Level::Sse42 => is_x86_feature_detected!("sse4.2"),
+            Level::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
+            Level::Avx512 => {
+                is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512vl")
+                    && is_x86_feature_detected!("avx512dq")
+                    && is_x86_feature_detected!("avx512bw")
+                    && Level::Avx2.is_available()
+            }
+        };
+        #[cfg(not(target_arch = "x86_64"))]
+        let has = self == Level::Portable;
+        has
+    }
+
+    /// Those that this processor has, from the least to the best.
+    pub fn available() -> Vec<Level> {
+        Level::ALL.into_iter().filter(|l| l.is_available()).collect()
+    }
+
+    /// The level to use: what [`VARIABLE`] forces, else the best there is. Errors where it names no level, or one that
+    /// this processor lacks.
+    pub fn chosen() -> Result<Level> {
+        let best = || Level::available().last().copied().unwrap_or(Level::Portable);
+        std::env::var(VARIABLE).map_or_else(|_| Ok(best()), |v| Level::parse(&v))
+    }
+
+    fn parse(text: &str) -> Result<Level> {
+        let names = Level::ALL.map(Level::name);
+        let level = Level::ALL.into_iter().find(|l| l.name() == text);
+        let level = level
+            .ok_or_else(|| Error::Usage(unknown_name("instruction set in SKYLIT_SIMD", text, names)))?;
+        if level.is_available() {
+            return Ok(level);
+        }
+        let has: Vec<_> = Level::available().into_iter().map(Level::name).collect();
+        Err(Error::Usage(format!("this processor has no {text} (SKYLIT_SIMD); it has {}", has.join(", "))))
+    }
+}
 
 /// Work to be compiled once for every instruction set.
 ///
@@ -48,8 +124,10 @@ impl<K: Kernel> WithSimd for Run<K> {
 /// The instruction set in use, decided at the first call and kept.
 fn arch() -> Option<Arch> {
     static ARCH: OnceLock<Option<Arch>> = OnceLock::new();
-    *ARCH.get_or_init(|| match std::env::var_os("SKYLIT_SIMD") {
-        Some(v) if v == "scalar" => None,
+    *ARCH.get_or_init(|| match Level::chosen() {
+        Ok(Level::Portable | Level::Sse42) => None,
+        #[cfg(target_arch = "x86_64")]
+        Ok(Level::Avx2) => pulp::x86::V3::try_new().map(Arch::V3),
         _ => Some(Arch::new()),
     })
 }
@@ -109,5 +187,16 @@ mod tests {
         assert!(baseline.iter().zip(&plain).all(|(a, b)| a.to_bits() == b.to_bits()));
         assert_eq!(dispatch(|| 42), 42);
         assert!(!name().is_empty());
+    }
+
+    #[test]
+    fn levels_are_read_or_refused_with_the_reason() {
+        assert_eq!(Level::parse("portable").ok(), Some(Level::Portable));
+        let unknown = Level::parse("avx3").unwrap_err().to_string();
+        assert!(unknown.contains("avx3") && unknown.contains("avx2"), "{unknown}");
+        for level in Level::ALL {
+            assert_eq!(Level::parse(level.name()).is_ok(), level.is_available(), "{level:?}");
+        }
+        assert!(Level::available().contains(&Level::Portable));
     }
 }
