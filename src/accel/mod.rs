@@ -1,8 +1,14 @@
 //! L2: ray kernels. One file (or folder) a kernel, and one row in [`KERNELS`].
 
 pub mod brute;
+#[cfg(feature = "bvh")]
+pub mod bvh;
 #[cfg(feature = "embree")]
 pub mod embree;
+#[cfg(any(feature = "bvh", feature = "embree"))]
+mod failure;
+#[cfg(any(feature = "bvh", feature = "embree"))]
+mod tame;
 #[cfg(test)]
 mod tests;
 
@@ -32,6 +38,8 @@ pub struct KernelRow {
 pub const KERNELS: &[KernelRow] = &[
     #[cfg(feature = "embree")]
     embree::ROW,
+    #[cfg(feature = "bvh")]
+    bvh::ROW,
     brute::ROW,
 ];
 

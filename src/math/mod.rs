@@ -6,6 +6,7 @@ pub mod frame;
 pub mod pages;
 pub mod quadric;
 pub mod simd;
+pub mod triangle;
 pub mod trig;
 
 pub use aabb::{Aabb, DAabb};

@@ -18,9 +18,9 @@ use pulp::{Arch, Scalar, Simd, WithSimd};
 pub enum Level {
     /// Plain Rust for whatever the program was compiled for.
     Portable,
-    /// SSE up to 4.2.
+    /// SSE up to 4.2, with POPCNT.
     Sse42,
-    /// AVX2 with FMA.
+    /// AVX2 with FMA and the bit operations of its time.
     Avx2,
     /// AVX-512 F, VL, DQ and BW.
     Avx512,
@@ -48,8 +48,15 @@ impl Level {
         #[cfg(target_arch = "x86_64")]
         let has = match self {
             Level::Portable => true,
-            Level::Sse42 => is_x86_feature_detected!("sse4.2"),
-            Level::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
+            Level::Sse42 => is_x86_feature_detected!("sse4.2") && is_x86_feature_detected!("popcnt"),
+            Level::Avx2 => {
+                is_x86_feature_detected!("avx2")
+                    && is_x86_feature_detected!("fma")
+                    && is_x86_feature_detected!("bmi1")
+                    && is_x86_feature_detected!("bmi2")
+                    && is_x86_feature_detected!("lzcnt")
+                    && is_x86_feature_detected!("popcnt")
+            }
             Level::Avx512 => {
                 is_x86_feature_detected!("avx512f")
                     && is_x86_feature_detected!("avx512vl")

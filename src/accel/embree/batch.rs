@@ -4,8 +4,8 @@
 
 use super::Kernel;
 use super::level::Level;
-use super::plan::DIRECTION;
 use super::query::{Entry, Query};
+use crate::accel::tame::DIRECTION;
 use crate::base::hit::{HitBatch, NO_PRIMITIVE};
 use crate::base::ray::{Coherence, Ray, RayBatch};
 use crate::base::shape::LocalRay;

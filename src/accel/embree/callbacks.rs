@@ -3,9 +3,10 @@
 //! Each callback is given an array of rays (`n` lanes, structure of arrays) and does its lanes one by one, with the
 //! original ray in double precision: the transform that Embree made in f32 is used for nothing but culling.
 
-use super::handles::{Failure, GeometryHandle};
+use super::handles::GeometryHandle;
 use super::level::{PORTAL_ID, SHAPE_BIT, user_data};
 use super::query::Query;
+use crate::accel::failure::Failure;
 use crate::accel::{accepted, first_crossing};
 use crate::base::geometry::Geometry;
 use crate::base::hit::Hit;

@@ -2,52 +2,10 @@
 
 use crate::error::{Error, Result};
 use embree_sys::*;
-use std::any::Any;
 use std::ffi::{CStr, CString, c_char, c_void};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::ptr;
-use std::sync::atomic::{AtomicBool, AtomicIsize, Ordering};
+use std::sync::atomic::{AtomicIsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-
-/// The first failure inside a callback or a build. Callbacks have no way to return one.
-#[derive(Default)]
-pub(super) struct Failure {
-    failed: AtomicBool,
-    message: Mutex<Option<String>>,
-}
-
-impl Failure {
-    /// Runs a callback's work. A panic must not unwind into Embree: it is kept, and the callback reports nothing.
-    #[inline]
-    pub(super) fn guard(&self, work: impl FnOnce()) {
-        // What a panic leaves half-done are ray records of a render that is about to fail.
-        if let Err(panic) = catch_unwind(AssertUnwindSafe(work)) {
-            self.record(panic_text(&*panic));
-        }
-    }
-
-    fn record(&self, text: String) {
-        let mut message = self.message.lock().unwrap_or_else(PoisonError::into_inner);
-        message.get_or_insert(text);
-        self.failed.store(true, Ordering::Release);
-    }
-
-    /// The failure since the last call, if any.
-    pub(super) fn take(&self) -> Result<()> {
-        if !self.failed.swap(false, Ordering::AcqRel) {
-            return Ok(());
-        }
-        let message = self.message.lock().unwrap_or_else(PoisonError::into_inner).take();
-        Err(Error::Internal(message.unwrap_or_else(|| "unknown failure in a ray query".to_owned())))
-    }
-}
-
-/// What `panic!` was given.
-fn panic_text(panic: &(dyn Any + Send)) -> String {
-    let text = panic.downcast_ref::<&str>().copied();
-    let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
-    format!("panic in a shape or hit filter: {}", text.unwrap_or("(no message)"))
-}
 
 /// What the device's callbacks write to; it must not move while the device lives.
 struct Reports {

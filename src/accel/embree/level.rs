@@ -1,8 +1,10 @@
 //! Embree scenes for groups: their leaves, and levels that place groups within groups.
 
 use super::callbacks::{self, FilterData, PortalData, ShapeData, ShapePrimitive};
-use super::handles::{Device, Failure, GeometryHandle, SceneHandle};
-use super::plan::{Placed, Plan, reach};
+use super::handles::{Device, GeometryHandle, SceneHandle};
+use super::plan::{Placed, Plan};
+use crate::accel::failure::Failure;
+use crate::accel::tame::{grown, reach};
 use crate::base::geometry::Geometry;
 use crate::base::intersectable::{BuildQuality, KernelMode, KernelOptions};
 use crate::base::mesh::TriangleMesh;
@@ -361,16 +363,6 @@ impl Levels {
         (self.levels.iter().map(of_level).sum::<usize>() + self.leaves.iter().map(of_leaves).sum::<usize>())
             as u64
     }
-}
-
-/// In double precision, and larger by a relative 1e-6 and more than f32 rounding of its corners.
-fn grown(b: Aabb) -> DAabb {
-    if b.is_empty() {
-        return DAabb::EMPTY;
-    }
-    let (min, max) = (b.min.as_dvec3(), b.max.as_dvec3());
-    let by = (min.abs().max(max.abs()).max_element() * 1e-6).max(f64::from(f32::MIN_POSITIVE));
-    DAabb { min: min - by, max: max + by }
 }
 
 /// The pointer that a callback casts back.

@@ -16,14 +16,16 @@ mod query;
 mod tests;
 
 use super::KernelRow;
+use super::failure::Failure;
+use super::tame::check_extent;
 use crate::base::geometry::Geometry;
 use crate::base::hit::{Hit, HitBatch};
 use crate::base::intersectable::{Intersectable, KernelMode, KernelOptions};
-use crate::base::ray::{Coherence, MAX_COORDINATE, Ray, RayBatch};
+use crate::base::ray::{Coherence, Ray, RayBatch};
 use crate::base::shape::LocalRay;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::math::aabb::Aabb;
-use handles::{Device, Failure};
+use handles::Device;
 use level::{Builder, Level, Levels};
 use query::Entry;
 use std::sync::Arc;
@@ -47,23 +49,14 @@ pub struct Kernel {
 
 impl Kernel {
     /// Builds the scenes. Errors where Embree fails (out of memory, a CPU too old), and where coordinates are beyond
-    /// [`MAX_COORDINATE`] or there are more primitives than its numbers can name.
+    /// [`MAX_COORDINATE`](crate::base::ray::MAX_COORDINATE) or there are more primitives than its numbers can name.
     pub fn new(geometry: Arc<Geometry>, options: &KernelOptions) -> Result<Self> {
         Kernel::with_budget(geometry, options, plan::FLATTEN_BUDGET)
     }
 
     /// With a limit on the instances that flattening may add.
     fn with_budget(geometry: Arc<Geometry>, options: &KernelOptions, budget: usize) -> Result<Self> {
-        for group in &geometry.groups {
-            let b = group.bounds;
-            let size = b.min.abs().max(b.max.abs());
-            if !b.is_empty() && !size.cmple(glam::Vec3::splat(MAX_COORDINATE)).all() {
-                return Err(Error::Internal(format!(
-                    "a group reaches from {} to {}, beyond {MAX_COORDINATE:e}",
-                    b.min, b.max
-                )));
-            }
-        }
+        check_extent(&geometry)?;
         let device = Device::new(options.threads)?;
         let failure = Arc::new(Failure::default());
         let levels = Builder::new(&geometry, &device, &failure, options).build(budget)?;

@@ -5,16 +5,12 @@
 //! is a portal: a user primitive whose callback takes the ray, in double precision, into the child's own scene.
 
 use crate::base::geometry::Geometry;
-use crate::base::ray::MAX_COORDINATE;
 use crate::math::aabb::Aabb;
 use glam::{DAffine3, DMat3, DVec3, Mat3};
 use std::collections::VecDeque;
 
 /// Instances that all flattening of a scene may add, at some 500 bytes each (Embree's part is 350).
 pub(super) const FLATTEN_BUDGET: usize = 1 << 18;
-
-/// Rays whose direction has its largest component in this range go to Embree as they are; others are rescaled.
-pub(super) const DIRECTION: std::ops::RangeInclusive<f32> = 1e-6..=1e6;
 
 /// Coordinates that Embree may meet anywhere. Its own limit, asserted in Debian's build, is 1.8e18.
 const SAFE: f64 = 1e17;
@@ -111,11 +107,4 @@ fn embree_can_hold(item: &Placed, bounds: Aabb, reach: f64) -> bool {
     // 1e-4: a placement so sheared that f32 inversion loses more than that goes by double precision instead.
     let error = single.inverse().as_dmat3() - from.matrix3;
     size(&error) <= 1e-4 * grow
-}
-
-/// How far from the origin of a scene with these bounds a ray may start to go to Embree as it is. Far outside of the
-/// scene, a ray that starts at its bounds instead is more accurate, and nothing can overflow.
-pub(super) fn reach(bounds: Aabb) -> f64 {
-    let extent = bounds.min.abs().max(bounds.max.abs()).max_element();
-    (16.0 * f64::from(extent)).clamp(1e6, 16.0 * f64::from(MAX_COORDINATE))
 }

@@ -1,12 +1,10 @@
 //! Single rays: into Embree, and what it found back into paths.
 
 use super::level::{Level, Levels, PORTAL_ID, SHAPE_BIT};
-use super::plan::DIRECTION;
+use crate::accel::tame::{Tame, extent};
 use crate::base::ray::RayBatch;
 use crate::base::shape::LocalRay;
-use crate::math::aabb::DAabb;
 use embree_sys::*;
-use glam::DVec3;
 use std::ptr;
 
 /// What callbacks can reach during a query, by the pointer in its `EmQuery`.
@@ -103,7 +101,7 @@ impl<'a> Entry<'a> {
     pub(super) fn closest(&self, ray: &LocalRay, key: u32) -> Option<Found> {
         let tame = self.tame(ray)?;
         let query = Query { entry: *self, source: Source::One(&tame.ray, key) };
-        let mut rayhit = RTCRayHit { ray: tame.embree(), hit: no_hit() };
+        let mut rayhit = RTCRayHit { ray: embree_ray(&tame), hit: no_hit() };
         // SAFETY: the scene is committed (levels are, when they are built), and `tame` lets no ray through that
         // Embree would refuse. The query and the ray outlive the call.
         unsafe {
@@ -124,7 +122,7 @@ impl<'a> Entry<'a> {
     pub(super) fn any(&self, ray: &LocalRay, key: u32) -> bool {
         let Some(tame) = self.tame(ray) else { return false };
         let query = Query { entry: *self, source: Source::One(&tame.ray, key) };
-        let mut shadow = tame.embree();
+        let mut shadow = embree_ray(&tame);
         // SAFETY: as in `closest`.
         unsafe {
             em_occluded1(self.level().scene.raw(), &mut EmQuery::new(false, query.user()), &mut shadow)
@@ -141,10 +139,6 @@ impl<'a> Entry<'a> {
             if self.level == 0 { level.reach } else { 16.0 * extent(&level.bounds) },
         )
     }
-}
-
-fn extent(b: &DAabb) -> f64 {
-    b.min.abs().max(b.max.abs()).max_element()
 }
 
 impl Level {
@@ -169,94 +163,24 @@ impl Level {
     }
 }
 
-/// A ray that Embree can be given: finite, not too far away, with a direction of sane length. `t` of the original is
-/// `shift + t * scale`.
-struct Tame {
-    ray: LocalRay,
-    shift: f64,
-    scale: f64,
-}
-
-impl Tame {
-    /// None for rays that are not valid, or cannot meet the bounds.
-    #[inline]
-    fn new(ray: &LocalRay, bounds: &DAabb, reach: f64) -> Option<Tame> {
-        let (o, d) = (ray.o.abs(), ray.d.abs());
-        let length = d.max_element();
-        let sane = f64::from(*DIRECTION.start())..=f64::from(*DIRECTION.end());
-        // `&` and comparisons that NaN fails: a maximum would lose one.
-        let near = o.cmple(DVec3::splat(reach)).all() & d.cmple(DVec3::splat(*sane.end())).all();
-        let segment = (ray.tnear >= 0.0) & (ray.tnear <= f64::from(f32::MAX)) & (ray.tfar >= ray.tnear);
-        if !segment {
-            return None;
-        }
-        if near && length >= *sane.start() {
-            return Some(Tame { ray: *ray, shift: 0.0, scale: 1.0 });
-        }
-        Tame::moved(ray, bounds, length)
+/// A ray that Embree accepts, as it takes it.
+#[inline]
+fn embree_ray(tame: &Tame) -> RTCRay {
+    let (o, d) = (tame.ray.o.as_vec3(), tame.ray.d.as_vec3());
+    RTCRay {
+        org_x: o.x,
+        org_y: o.y,
+        org_z: o.z,
+        tnear: tame.ray.tnear as f32,
+        dir_x: d.x,
+        dir_y: d.y,
+        dir_z: d.z,
+        time: 0.0,
+        tfar: tame.ray.tfar as f32,
+        mask: u32::MAX,
+        id: 0,
+        flags: 0,
     }
-
-    /// With a direction of length about 1, and from where the ray enters the bounds.
-    #[cold]
-    fn moved(ray: &LocalRay, bounds: &DAabb, length: f64) -> Option<Tame> {
-        if !(ray.o.is_finite() && ray.d.is_finite() && length.is_normal()) {
-            return None;
-        }
-        // A power of two, so that nothing is rounded.
-        let scale = f64::from_bits((length.recip().to_bits() >> 52) << 52);
-        let d = ray.d * scale;
-        let (near, far) = (ray.tnear / scale, ray.tfar / scale);
-        let [enter, leave] = crossing(bounds, ray.o, d)?;
-        let shift = enter.max(0.0);
-        let tnear = (near - shift).max(0.0);
-        let tfar = (far - shift).min(leave - shift);
-        let ray = LocalRay { o: ray.o + d * shift, d, tnear, tfar };
-        let valid = tfar >= tnear && tnear <= f64::from(f32::MAX);
-        valid.then_some(Tame { ray, shift: shift * scale, scale })
-    }
-
-    #[inline]
-    fn restored(&self, t: f64) -> f64 {
-        self.shift + t * self.scale
-    }
-
-    #[inline]
-    fn embree(&self) -> RTCRay {
-        let (o, d) = (self.ray.o.as_vec3(), self.ray.d.as_vec3());
-        RTCRay {
-            org_x: o.x,
-            org_y: o.y,
-            org_z: o.z,
-            tnear: self.ray.tnear as f32,
-            dir_x: d.x,
-            dir_y: d.y,
-            dir_z: d.z,
-            time: 0.0,
-            tfar: self.ray.tfar as f32,
-            mask: u32::MAX,
-            id: 0,
-            flags: 0,
-        }
-    }
-}
-
-/// Where a line enters and leaves a box, grown by a thousandth for the rounding of far origins; none if it misses.
-fn crossing(b: &DAabb, o: DVec3, d: DVec3) -> Option<[f64; 2]> {
-    let by = extent(b) * 1e-3;
-    let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
-    for k in 0..3 {
-        let (low, high) = (b.min[k] - by - o[k], b.max[k] + by - o[k]);
-        if d[k] == 0.0 {
-            if low > 0.0 || high < 0.0 {
-                return None;
-            }
-            continue;
-        }
-        let (a, c) = (low / d[k], high / d[k]);
-        enter = enter.max(a.min(c));
-        leave = leave.min(a.max(c));
-    }
-    (enter <= leave && leave >= 0.0).then_some([enter, leave])
 }
 
 /// What Embree expects before a query.

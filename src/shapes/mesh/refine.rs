@@ -2,6 +2,7 @@
 
 use crate::base::shape::LocalRay;
 use crate::math::bounds::{U32, UNDERFLOW, gamma};
+use crate::math::triangle::TriangleRay;
 use glam::{DVec3, Vec3, Vec3A, Vec3Swizzles};
 
 /// A point of a triangle.
@@ -15,43 +16,9 @@ pub struct TrianglePoint {
     pub t: f64,
 }
 
-/// The t at which the ray crosses the plane of the triangle, if that lies within it; closed at the edges, and without gaps
-/// between neighbours: an edge gives both its triangles the same edge function, up to the sign (Woop, Benthin,
-/// Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013, in double precision).
+/// The t at which the ray meets the triangle, by the test that decides for all kernels: see [`TriangleRay`].
 pub fn intersect(ray: &LocalRay, v: [DVec3; 3]) -> Option<f64> {
-    let d = ray.d;
-    let a = d.abs();
-    // z along the direction's largest axis.
-    let (kx, ky, kz) = if a.x > a.y && a.x > a.z {
-        (1, 2, 0)
-    } else if a.y > a.z {
-        (2, 0, 1)
-    } else {
-        (0, 1, 2)
-    };
-    let (sx, sy, sz) = (d[kx] / d[kz], d[ky] / d[kz], 1.0 / d[kz]);
-    let [p0, p1, p2] = v.map(|c| {
-        let c = c - ray.o;
-        DVec3::new(c[kx] - sx * c[kz], c[ky] - sy * c[kz], sz * c[kz])
-    });
-    let e0 = p1.x * p2.y - p1.y * p2.x;
-    let e1 = p2.x * p0.y - p2.y * p0.x;
-    let e2 = p0.x * p1.y - p0.y * p1.x;
-    if (e0 < 0.0 || e1 < 0.0 || e2 < 0.0) && (e0 > 0.0 || e1 > 0.0 || e2 > 0.0) {
-        return None;
-    }
-    if e0 == 0.0 && e1 == 0.0 && e2 == 0.0 {
-        return None;
-    }
-    // The distance by the plane and not by the sheared corners: a ray that leaves a triangle in a plane of one
-    // coordinate (a floor at y = 0) starts a single step of f32 beside it, which is nothing next to the rounding of the
-    // other coordinates, but here multiplies exact zeros by those. Where the ray runs in the plane (t may
-    // be NaN), the corners bound it.
-    let Triangle { v0, n, .. } = Triangle::between(v);
-    let t = (v0 - ray.o).dot(n) / d.dot(n);
-    let near = p0.z.min(p1.z).min(p2.z);
-    let far = p0.z.max(p1.z).max(p2.z);
-    let t = t.max(near).min(far);
+    let t = TriangleRay::new(ray.o, ray.d).distance(v)?;
     (t >= ray.tnear && t <= ray.tfar).then_some(t)
 }
 

@@ -1,0 +1,91 @@
+//! AVX2 with FMA. AVX-512 runs the same code, compiled for its masks and its 32 registers.
+#![allow(unsafe_code, reason = "intrinsics")]
+
+use super::{Available, Job, Lanes, Simd};
+use std::arch::x86_64::*;
+
+#[derive(Clone, Copy)]
+pub(super) struct Avx2;
+
+/// The body of an operation.
+macro_rules! op {
+    ($e:expr) => {
+        // SAFETY: this type is only used below the functions that enter, which hold an `Available` of this level.
+        unsafe { $e }
+    };
+}
+
+impl Simd for Avx2 {
+    type V = __m256;
+
+    #[inline(always)]
+    fn load(from: &Lanes) -> __m256 {
+        op!(_mm256_load_ps(from.0.as_ptr()))
+    }
+    #[inline(always)]
+    fn store(v: __m256) -> Lanes {
+        op!(std::mem::transmute::<__m256, Lanes>(v))
+    }
+    #[inline(always)]
+    fn splat(x: f32) -> __m256 {
+        op!(_mm256_set1_ps(x))
+    }
+    #[inline(always)]
+    fn add(a: __m256, b: __m256) -> __m256 {
+        op!(_mm256_add_ps(a, b))
+    }
+    #[inline(always)]
+    fn sub(a: __m256, b: __m256) -> __m256 {
+        op!(_mm256_sub_ps(a, b))
+    }
+    #[inline(always)]
+    fn mul(a: __m256, b: __m256) -> __m256 {
+        op!(_mm256_mul_ps(a, b))
+    }
+    #[inline(always)]
+    fn mul_add(a: __m256, b: __m256, c: __m256) -> __m256 {
+        op!(_mm256_fmadd_ps(a, b, c))
+    }
+    #[inline(always)]
+    fn mul_sub(a: __m256, b: __m256, c: __m256) -> __m256 {
+        op!(_mm256_fmsub_ps(a, b, c))
+    }
+    #[inline(always)]
+    fn neg_mul_add(a: __m256, b: __m256, c: __m256) -> __m256 {
+        op!(_mm256_fnmadd_ps(a, b, c))
+    }
+    #[inline(always)]
+    fn min(a: __m256, b: __m256) -> __m256 {
+        op!(_mm256_min_ps(a, b))
+    }
+    #[inline(always)]
+    fn max(a: __m256, b: __m256) -> __m256 {
+        op!(_mm256_max_ps(a, b))
+    }
+    #[inline(always)]
+    fn le(a: __m256, b: __m256) -> u32 {
+        op!(_mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)) as u32)
+    }
+}
+
+/// Runs a job by AVX2.
+#[inline(always)]
+pub(super) fn enter<J: Job>(_: Available, job: J) -> J::Output {
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt")]
+    fn inner<J: Job>(job: J) -> J::Output {
+        job.run::<Avx2>()
+    }
+    // SAFETY: the level was seen to be available with these features (`Level::is_available`).
+    unsafe { inner(job) }
+}
+
+/// Runs a job by AVX2 code in AVX-512's encoding.
+#[inline(always)]
+pub(super) fn enter_avx512<J: Job>(_: Available, job: J) -> J::Output {
+    #[target_feature(enable = "avx2,fma,bmi1,bmi2,lzcnt,popcnt,avx512f,avx512vl,avx512dq,avx512bw")]
+    fn inner<J: Job>(job: J) -> J::Output {
+        job.run::<Avx2>()
+    }
+    // SAFETY: as above.
+    unsafe { inner(job) }
+}

@@ -1,0 +1,72 @@
+//! Arrays of eight in plain Rust; the compiler makes NEON of it on aarch64.
+
+use super::{LANES, Lanes, Simd};
+
+#[derive(Clone, Copy)]
+pub(super) struct Portable;
+
+#[inline(always)]
+fn zip(a: Lanes, b: Lanes, f: impl Fn(f32, f32) -> f32) -> Lanes {
+    let mut out = a;
+    for i in 0..LANES {
+        out.0[i] = f(a.0[i], b.0[i]);
+    }
+    out
+}
+
+impl Simd for Portable {
+    type V = Lanes;
+
+    #[inline(always)]
+    fn load(from: &Lanes) -> Lanes {
+        *from
+    }
+    #[inline(always)]
+    fn store(v: Lanes) -> Lanes {
+        v
+    }
+    #[inline(always)]
+    fn splat(x: f32) -> Lanes {
+        Lanes([x; LANES])
+    }
+    #[inline(always)]
+    fn add(a: Lanes, b: Lanes) -> Lanes {
+        zip(a, b, |a, b| a + b)
+    }
+    #[inline(always)]
+    fn sub(a: Lanes, b: Lanes) -> Lanes {
+        zip(a, b, |a, b| a - b)
+    }
+    #[inline(always)]
+    fn mul(a: Lanes, b: Lanes) -> Lanes {
+        zip(a, b, |a, b| a * b)
+    }
+    #[inline(always)]
+    fn mul_add(a: Lanes, b: Lanes, c: Lanes) -> Lanes {
+        Self::add(Self::mul(a, b), c)
+    }
+    #[inline(always)]
+    fn mul_sub(a: Lanes, b: Lanes, c: Lanes) -> Lanes {
+        Self::sub(Self::mul(a, b), c)
+    }
+    #[inline(always)]
+    fn neg_mul_add(a: Lanes, b: Lanes, c: Lanes) -> Lanes {
+        Self::sub(c, Self::mul(a, b))
+    }
+    #[inline(always)]
+    fn min(a: Lanes, b: Lanes) -> Lanes {
+        zip(a, b, |a, b| if a < b { a } else { b })
+    }
+    #[inline(always)]
+    fn max(a: Lanes, b: Lanes) -> Lanes {
+        zip(a, b, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
+    fn le(a: Lanes, b: Lanes) -> u32 {
+        let mut bits = 0;
+        for i in 0..LANES {
+            bits |= u32::from(a.0[i] <= b.0[i]) << i;
+        }
+        bits
+    }
+}

@@ -1,0 +1,80 @@
+//! SSE up to 4.2: two vectors of four.
+#![allow(unsafe_code, reason = "intrinsics")]
+
+use super::{Available, Job, Lanes, Simd};
+use std::arch::x86_64::*;
+
+#[derive(Clone, Copy)]
+pub(super) struct Sse42;
+
+/// The body of an operation.
+macro_rules! op {
+    ($e:expr) => {
+        // SAFETY: this type is only used below the functions that enter, which hold an `Available` of this level.
+        unsafe { $e }
+    };
+}
+
+impl Simd for Sse42 {
+    type V = [__m128; 2];
+
+    #[inline(always)]
+    fn load(from: &Lanes) -> [__m128; 2] {
+        op!([_mm_load_ps(from.0.as_ptr()), _mm_load_ps(from.0.as_ptr().add(4))])
+    }
+    #[inline(always)]
+    fn store(v: [__m128; 2]) -> Lanes {
+        op!(std::mem::transmute::<[__m128; 2], Lanes>(v))
+    }
+    #[inline(always)]
+    fn splat(x: f32) -> [__m128; 2] {
+        op!([_mm_set1_ps(x); 2])
+    }
+    #[inline(always)]
+    fn add(a: [__m128; 2], b: [__m128; 2]) -> [__m128; 2] {
+        op!([_mm_add_ps(a[0], b[0]), _mm_add_ps(a[1], b[1])])
+    }
+    #[inline(always)]
+    fn sub(a: [__m128; 2], b: [__m128; 2]) -> [__m128; 2] {
+        op!([_mm_sub_ps(a[0], b[0]), _mm_sub_ps(a[1], b[1])])
+    }
+    #[inline(always)]
+    fn mul(a: [__m128; 2], b: [__m128; 2]) -> [__m128; 2] {
+        op!([_mm_mul_ps(a[0], b[0]), _mm_mul_ps(a[1], b[1])])
+    }
+    #[inline(always)]
+    fn mul_add(a: [__m128; 2], b: [__m128; 2], c: [__m128; 2]) -> [__m128; 2] {
+        Self::add(Self::mul(a, b), c)
+    }
+    #[inline(always)]
+    fn mul_sub(a: [__m128; 2], b: [__m128; 2], c: [__m128; 2]) -> [__m128; 2] {
+        Self::sub(Self::mul(a, b), c)
+    }
+    #[inline(always)]
+    fn neg_mul_add(a: [__m128; 2], b: [__m128; 2], c: [__m128; 2]) -> [__m128; 2] {
+        Self::sub(c, Self::mul(a, b))
+    }
+    #[inline(always)]
+    fn min(a: [__m128; 2], b: [__m128; 2]) -> [__m128; 2] {
+        op!([_mm_min_ps(a[0], b[0]), _mm_min_ps(a[1], b[1])])
+    }
+    #[inline(always)]
+    fn max(a: [__m128; 2], b: [__m128; 2]) -> [__m128; 2] {
+        op!([_mm_max_ps(a[0], b[0]), _mm_max_ps(a[1], b[1])])
+    }
+    #[inline(always)]
+    fn le(a: [__m128; 2], b: [__m128; 2]) -> u32 {
+        op!((_mm_movemask_ps(_mm_cmple_ps(a[0], b[0])) | _mm_movemask_ps(_mm_cmple_ps(a[1], b[1])) << 4) as u32)
+    }
+}
+
+/// Runs a job by SSE4.2.
+#[inline(always)]
+pub(super) fn enter<J: Job>(_: Available, job: J) -> J::Output {
+    #[target_feature(enable = "sse4.2,popcnt")]
+    fn inner<J: Job>(job: J) -> J::Output {
+        job.run::<Sse42>()
+    }
+    // SAFETY: the level was seen to be available with these features (`Level::is_available`).
+    unsafe { inner(job) }
+}
