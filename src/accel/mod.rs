@@ -7,6 +7,8 @@ pub mod bvh;
 pub mod embree;
 #[cfg(any(feature = "bvh", feature = "embree"))]
 mod failure;
+#[cfg(feature = "bvh")]
+pub mod obvhs;
 #[cfg(any(feature = "bvh", feature = "embree"))]
 mod tame;
 #[cfg(test)]
@@ -40,6 +42,8 @@ pub const KERNELS: &[KernelRow] = &[
     embree::ROW,
     #[cfg(feature = "bvh")]
     bvh::ROW,
+    #[cfg(feature = "bvh")]
+    obvhs::ROW,
     brute::ROW,
 ];
 

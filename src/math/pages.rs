@@ -43,6 +43,34 @@ impl<T: Pod + Send + Sync> Pages<T> {
         pages
     }
 
+    /// So many values a part, one part after the other, each written by `fill` (given its number and zeros), in
+    /// parallel.
+    ///
+    /// # Panics
+    /// As [`Pages::from_fn`].
+    pub fn from_parts(lengths: &[usize], fill: impl Fn(usize, &mut [T]) + Sync) -> Self {
+        assert!(size_of::<T>() > 0 && align_of::<T>() <= align_of::<Line>(), "a plain type of some size");
+        let bytes = lengths.iter().sum::<usize>() * size_of::<T>();
+        let mut pages = Pages { store: Store::new(bytes), kind: PhantomData };
+        let mut rest = pages.as_mut_slice(bytes);
+        let mut parts = Vec::with_capacity(lengths.len());
+        for (i, &n) in lengths.iter().enumerate() {
+            let (part, after) = rest.split_at_mut(n);
+            parts.push((i, part));
+            rest = after;
+        }
+        parts.into_par_iter().for_each(|(i, part)| fill(i, part));
+        pages
+    }
+
+    /// Bytes held.
+    pub fn memory(&self) -> u64 {
+        match &self.store {
+            Store::Heap(lines) => size_of_val(&lines[..]) as u64,
+            Store::Mapped(map) => map.len() as u64,
+        }
+    }
+
     fn as_mut_slice(&mut self, bytes: usize) -> &mut [T] {
         bytemuck::cast_slice_mut(match &mut self.store {
             Store::Heap(lines) => &mut bytemuck::cast_slice_mut(lines)[..bytes],
@@ -89,6 +117,10 @@ mod tests {
         for n in [1, 1000, 400_001] {
             let pages = Pages::from_fn(n, |i| [i as f32, 0.5, -1.0]);
             let all: &[[f32; 3]] = pages.as_slice();
+            let halves = Pages::from_parts(&[n / 2, n - n / 2], |part, to: &mut [[f32; 3]]| {
+                to.iter_mut().enumerate().for_each(|(i, v)| *v = [(i + part * (n / 2)) as f32, 0.5, -1.0]);
+            });
+            assert_eq!(&halves.as_slice()[..n], &all[..n]);
             assert!(all.len() >= n && all[..n].iter().enumerate().all(|(i, v)| *v == [i as f32, 0.5, -1.0]));
         }
     }

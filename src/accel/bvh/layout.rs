@@ -1,24 +1,33 @@
 //! Nodes and leaves as they lie in memory.
 
-use super::simd::{LANES, Lanes};
+use super::simd::{LANES, Lanes, Simd};
 use crate::math::aabb::{Aabb, DAabb};
+use crate::math::pages::Pages;
+use bytemuck::{Pod, Zeroable};
 use glam::{DAffine3, Vec3};
 
 /// An inner node: the boxes of up to eight children, four cache lines in all.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(super) struct Node {
     /// By axis; of each the lower and the upper planes. The box of a lane without a child is inside out.
     pub(super) planes: [[Lanes; 2]; 3],
     /// By lane.
-    pub(super) children: [Child; LANES],
+    pub(super) children: Children,
+    /// To the end of the cache line.
+    rest: [u32; LANES],
 }
+
+/// The children of a node, where vectors can be loaded from.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C, align(32))]
+pub(super) struct Children(pub(super) [Child; LANES]);
 
 impl Node {
     /// Without children.
     pub(super) fn empty() -> Self {
         let outside = [Lanes([f32::INFINITY; LANES]), Lanes([f32::NEG_INFINITY; LANES])];
-        Node { planes: [outside; 3], children: [Child::NONE; LANES] }
+        Node { planes: [outside; 3], children: Children([Child::NONE; LANES]), rest: [0; LANES] }
     }
 
     /// Sets a lane; `bounds` is not empty.
@@ -27,18 +36,20 @@ impl Node {
             self.planes[axis][0].0[lane] = bounds.min[axis];
             self.planes[axis][1].0[lane] = bounds.max[axis];
         }
-        self.children[lane] = child;
+        self.children.0[lane] = child;
     }
 
     /// The box of a lane.
     pub(super) fn bounds(&self, lane: usize) -> Aabb {
-        let corner = |side: usize| Vec3::from_array([0, 1, 2].map(|axis: usize| self.planes[axis][side].0[lane]));
+        let corner =
+            |side: usize| Vec3::from_array([0, 1, 2].map(|axis: usize| self.planes[axis][side].0[lane]));
         Aabb { min: corner(0), max: corner(1) }
     }
 }
 
 /// What hangs below a lane of a node: two bits for its kind, and a number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(transparent)]
 pub(super) struct Child(u32);
 
 /// A child by kind.
@@ -109,7 +120,7 @@ impl Child {
 }
 
 /// Up to eight triangles with their vertices in full, so that a test reads nothing else: five cache lines.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(super) struct Block {
     /// By axis and corner.
@@ -135,12 +146,13 @@ impl Block {
         self.size.0[lane] = longest * (1.0 + f32::EPSILON);
     }
 
-    /// The corners of a triangle, without loss.
+    /// The corners of a triangle with their coordinates in the order of these axes, without loss.
     #[inline(always)]
-    pub(super) fn corners(&self, lane: usize) -> [glam::DVec3; 3] {
-        let lane = lane % LANES;
-        let v = |c: usize| Vec3::new(self.v[0][c].0[lane], self.v[1][c].0[lane], self.v[2][c].0[lane]).as_dvec3();
-        [v(0), v(1), v(2)]
+    pub(super) fn corners(&self, lane: usize, axes: [usize; 3]) -> [[f64; 3]; 3] {
+        let (lane, [x, y, z]) = (lane % LANES, axes);
+        let (x, y, z) = (&self.v[x % 3], &self.v[y % 3], &self.v[z % 3]);
+        let corner = |c: usize| [x[c].0[lane].into(), y[c].0[lane].into(), z[c].0[lane].into()];
+        [corner(0), corner(1), corner(2)]
     }
 
     /// How many lanes hold a triangle.
@@ -170,19 +182,20 @@ pub(super) struct Instance {
 }
 
 /// Which triangles a block holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
 pub(super) struct BlockIds {
     /// Triangle within its mesh, by lane.
     pub(super) prim: [u32; LANES],
 }
 
-/// Everything of one group.
-#[derive(Debug, Clone, Default)]
+/// Everything of one group. What rays read at random lies in large pages.
 pub(super) struct Tree {
-    pub(super) nodes: Vec<Node>,
-    pub(super) blocks: Vec<Block>,
-    /// By block.
-    pub(super) ids: Vec<BlockIds>,
+    nodes: Pages<Node>,
+    pub(super) node_count: usize,
+    blocks: Pages<Block>,
+    pub(super) block_count: usize,
+    ids: Pages<BlockIds>,
     /// Leaf of the group by block and lane; empty where all triangles are those of `only_mesh`.
     pub(super) owners: Vec<[u32; LANES]>,
     /// The group's leaf with triangles, if there is just one.
@@ -197,6 +210,8 @@ pub(super) struct Tree {
     pub(super) grown: DAabb,
     /// Largest sizes of coordinates, by axis.
     pub(super) extent: Vec3,
+    /// 1, or 0 where boxes are not enlarged and single precision decides: fast, and not watertight.
+    pub(super) slack: f32,
     /// How far from the origin a ray may start to be traced as it is.
     pub(super) reach: f64,
     /// The most that a search can leave waiting.
@@ -206,6 +221,67 @@ pub(super) struct Tree {
 }
 
 impl Tree {
+    /// With nothing in it.
+    pub(super) fn empty() -> Self {
+        Tree {
+            nodes: Pages::from_parts(&[], |_, _| ()),
+            node_count: 0,
+            blocks: Pages::from_parts(&[], |_, _| ()),
+            block_count: 0,
+            ids: Pages::from_parts(&[], |_, _| ()),
+            owners: Vec::new(),
+            only_mesh: 0,
+            shapes: Vec::new(),
+            instances: Vec::new(),
+            root: None,
+            bounds: Aabb::EMPTY,
+            grown: DAabb::EMPTY,
+            extent: Vec3::ZERO,
+            slack: 1.0,
+            reach: 0.0,
+            waiting: 0,
+            has_filters: false,
+        }
+    }
+
+    /// Takes its arrays.
+    pub(super) fn fill(
+        &mut self,
+        nodes: (Pages<Node>, usize),
+        blocks: (Pages<Block>, usize),
+        ids: Pages<BlockIds>,
+    ) {
+        (self.nodes, self.node_count) = nodes;
+        (self.blocks, self.block_count) = blocks;
+        self.ids = ids;
+    }
+
+    #[inline(always)]
+    pub(super) fn nodes(&self) -> &[Node] {
+        self.nodes.as_slice()
+    }
+
+    #[inline(always)]
+    pub(super) fn blocks(&self) -> &[Block] {
+        self.blocks.as_slice()
+    }
+
+    /// By block.
+    #[inline(always)]
+    pub(super) fn ids(&self) -> &[BlockIds] {
+        self.ids.as_slice()
+    }
+
+    /// Asks for what will be visited soon.
+    #[inline(always)]
+    pub(super) fn fetch<S: Simd>(&self, child: Child) {
+        if child.is_node() {
+            S::prefetch(&self.nodes()[child.index()]);
+        } else if let Target::Block(i) = child.target() {
+            S::prefetch(&self.blocks()[i]);
+        }
+    }
+
     /// The group's leaf whose triangle is in this lane.
     #[inline(always)]
     pub(super) fn owner(&self, block: usize, lane: usize) -> u32 {
@@ -214,11 +290,8 @@ impl Tree {
 
     /// Bytes of all arrays.
     pub(super) fn memory(&self) -> u64 {
-        (size_of_val(&self.nodes[..])
-            + size_of_val(&self.blocks[..])
-            + size_of_val(&self.ids[..])
-            + size_of_val(&self.owners[..])
-            + size_of_val(&self.shapes[..])
-            + size_of_val(&self.instances[..])) as u64
+        let rest =
+            size_of_val(&self.owners[..]) + size_of_val(&self.shapes[..]) + size_of_val(&self.instances[..]);
+        self.nodes.memory() + self.blocks.memory() + self.ids.memory() + rest as u64
     }
 }

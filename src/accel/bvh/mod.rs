@@ -9,27 +9,33 @@
 //! Nested groups are met as they are nested, to any depth: a ray is taken into a group's space in double precision, and
 //! what remains to be done outside waits on an explicit stack.
 
+mod batch;
 mod build;
+mod columns;
 mod layout;
+mod open;
 mod ray;
 mod simd;
+mod stream;
 mod validate;
 mod walk;
 
-
+#[cfg(test)]
+mod tests;
 
 use super::KernelRow;
 use super::failure::Failure;
 use super::tame::check_extent;
 use crate::base::geometry::Geometry;
 use crate::base::hit::{Hit, HitBatch};
-use crate::base::intersectable::{Intersectable, KernelOptions, QueryKind, Visits};
+use crate::base::intersectable::{Intersectable, KernelMode, KernelOptions, QueryKind, Visits};
 use crate::base::ray::{Coherence, Ray, RayBatch};
 use crate::base::shape::LocalRay;
 use crate::error::Result;
 use crate::math::aabb::Aabb;
+use batch::Batch;
 use glam::DAffine3;
-use layout::{Instance, Tree};
+use layout::{Child, Instance, Tree};
 use ray::LevelRay;
 use simd::{Available, Job, Simd, enter};
 use std::cell::Cell;
@@ -49,6 +55,7 @@ pub struct Kernel {
     /// By group.
     trees: Vec<Tree>,
     level: Available,
+    mode: KernelMode,
     failure: Failure,
 }
 
@@ -59,7 +66,7 @@ impl Kernel {
         check_extent(&geometry)?;
         let level = Available::new(options.simd)?;
         let trees = build::build(&geometry, options)?;
-        Ok(Kernel { geometry, trees, level, failure: Failure::default() })
+        Ok(Kernel { geometry, trees, level, mode: options.mode, failure: Failure::default() })
     }
 
     fn root(&self) -> usize {
@@ -75,40 +82,60 @@ impl Kernel {
         count: &mut C,
     ) -> Search<'a> {
         let exact = LocalRay::from_ray(ray);
-        let mut search = Search::new(&exact, ray.key, &self.failure);
-        if !ray.is_valid() {
-            return search;
-        }
-        let group = self.root();
-        let tree = &self.trees[group];
-        let Some(child) = tree.root else { return search };
-        let Some(level) = LevelRay::new(tree, exact, 0) else { return search };
-        stack.len = 0;
-        stack.reserve(tree.waiting);
-        stack.push(child, f32::NEG_INFINITY);
-        let mut here = Frame { level, group, from_render: DAffine3::IDENTITY, base: 0 };
-        // The levels that wait until the one above them is done.
-        let mut outer: Vec<Frame> = Vec::new();
-        loop {
-            let group = &self.geometry.groups[here.group];
-            match walk::<S, C, ANY>(&here.level, group, &mut search, stack, here.base, count) {
-                Stop::At(i) => {
-                    let instance = here.level.tree.instances[i];
-                    if let Some(inner) = self.below(&here, outer.is_empty(), &instance, &exact, &search, stack) {
-                        outer.push(std::mem::replace(&mut here, inner));
-                    }
-                }
-                Stop::Done if ANY && search.found.is_some() => break,
-                Stop::Done => match outer.pop() {
-                    Some(frame) => here = frame,
-                    None => break,
-                },
-            }
+        let mut search = Search::ending(exact.tfar, ray.key, &self.failure);
+        if let Some((level, child)) = self.enter_root(ray, &exact) {
+            self.finish::<S, C, ANY>(&level, child, &mut search, stack, count);
         }
         search
     }
 
-    /// The level of an instance, with its tree waiting on the stack; none if the ray passes it by.
+    /// Searches a part of the root's tree, and all that is placed there.
+    #[inline(always)]
+    fn finish<'a, S: Simd, C: Counter, const ANY: bool>(
+        &'a self,
+        root: &LevelRay<'a>,
+        child: Child,
+        search: &mut Search,
+        stack: &mut Stack,
+        count: &mut C,
+    ) {
+        let mut here = Frame { level: *root, group: self.root(), from_render: DAffine3::IDENTITY, base: 0 };
+        stack.len = 0;
+        stack.reserve(root.tree.waiting);
+        stack.push(child, f32::NEG_INFINITY);
+        // The levels that wait until the one above them is done.
+        let mut outer: Vec<Frame> = Vec::new();
+        loop {
+            let group = &self.geometry.groups[here.group];
+            match walk::<S, C, ANY>(&here.level, group, search, stack, here.base, count) {
+                Stop::At(i) => {
+                    let instance = here.level.tree.instances[i];
+                    let inner = self.below(&here, outer.is_empty(), &instance, &root.exact, search, stack);
+                    if let Some((inner, child)) = inner {
+                        stack.push(child, f32::NEG_INFINITY);
+                        outer.push(std::mem::replace(&mut here, inner));
+                    }
+                }
+                Stop::Done if ANY && search.found.is_some() => return,
+                Stop::Done => match outer.pop() {
+                    Some(frame) => here = frame,
+                    None => return,
+                },
+            }
+        }
+    }
+
+    /// The root's level, and where its tree begins; none if the ray meets nothing, or is not valid.
+    #[inline(always)]
+    fn enter_root<'a>(&'a self, ray: &Ray, exact: &LocalRay) -> Option<(LevelRay<'a>, Child)> {
+        if !ray.is_valid() {
+            return None;
+        }
+        let tree = &self.trees[self.root()];
+        Some((LevelRay::new(tree, *exact, 0)?, tree.root?))
+    }
+
+    /// The level of an instance, and where its tree begins; none if the ray passes it by.
     #[inline(always)]
     fn below<'a>(
         &'a self,
@@ -118,7 +145,7 @@ impl Kernel {
         render: &LocalRay,
         search: &Search,
         stack: &mut Stack,
-    ) -> Option<Frame<'a>> {
+    ) -> Option<(Frame<'a>, Child)> {
         let group = instance.group as usize;
         let tree = &self.trees[group];
         let root = tree.root?;
@@ -130,8 +157,7 @@ impl Kernel {
         let level = LevelRay::new(tree, exact, first_path)?;
         let base = stack.len;
         stack.reserve(tree.waiting);
-        stack.push(root, f32::NEG_INFINITY);
-        Some(Frame { level, group, from_render, base })
+        Some((Frame { level, group, from_render, base }, root))
     }
 }
 
@@ -170,50 +196,6 @@ impl<C: Counter, const ANY: bool> Job for One<'_, C, ANY> {
     }
 }
 
-/// The closest hits of a batch, ray by ray.
-struct Closest<'a> {
-    kernel: &'a Kernel,
-    rays: &'a RayBatch,
-    hits: &'a mut HitBatch,
-}
-
-impl Job for Closest<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Simd>(self) {
-        let mut stack = STACK.take().unwrap_or_default();
-        for i in 0..self.rays.len() {
-            let search = self.kernel.search::<S, (), false>(&self.rays.get(i), &mut stack, &mut ());
-            if let Some(hit) = search.hit() {
-                self.hits.set(i, Some(hit));
-            }
-        }
-        STACK.set(Some(stack));
-    }
-}
-
-/// Any hits of a batch, ray by ray.
-struct Any<'a> {
-    kernel: &'a Kernel,
-    rays: &'a RayBatch,
-    blocked: &'a mut [bool],
-}
-
-impl Job for Any<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<S: Simd>(self) {
-        let mut stack = STACK.take().unwrap_or_default();
-        for (i, blocked) in self.blocked.iter_mut().enumerate() {
-            let search = self.kernel.search::<S, (), true>(&self.rays.get(i), &mut stack, &mut ());
-            *blocked = search.found.is_some();
-        }
-        STACK.set(Some(stack));
-    }
-}
-
 impl Intersectable for Kernel {
     fn bounds(&self) -> Aabb {
         self.geometry.root().bounds
@@ -227,15 +209,15 @@ impl Intersectable for Kernel {
         enter(self.level, One::<(), true> { kernel: self, ray, count: &mut () }).0
     }
 
-    fn intersect_batch(&self, rays: &RayBatch, hits: &mut HitBatch, _coherence: Coherence) {
+    fn intersect_batch(&self, rays: &RayBatch, hits: &mut HitBatch, coherence: Coherence) {
         hits.reset(rays.len());
-        enter(self.level, Closest { kernel: self, rays, hits });
+        enter(self.level, Batch::<_, false> { kernel: self, rays, coherence, out: hits });
     }
 
-    fn occluded_batch(&self, rays: &RayBatch, blocked: &mut Vec<bool>, _coherence: Coherence) {
+    fn occluded_batch(&self, rays: &RayBatch, blocked: &mut Vec<bool>, coherence: Coherence) {
         blocked.clear();
         blocked.resize(rays.len(), false);
-        enter(self.level, Any { kernel: self, rays, blocked });
+        enter(self.level, Batch::<_, true> { kernel: self, rays, coherence, out: &mut blocked[..] });
     }
 
     fn visits(&self, ray: &Ray, query: QueryKind) -> Option<Visits> {
@@ -256,7 +238,11 @@ impl Intersectable for Kernel {
     }
 
     fn describe(&self) -> String {
-        format!("bvh {}", self.level.level().name())
+        let mode = match self.mode {
+            KernelMode::Robust => "",
+            KernelMode::Fast => " fast",
+        };
+        format!("bvh {}{mode}", self.level.level().name())
     }
 
     fn take_failure(&self) -> Result<()> {

@@ -18,7 +18,7 @@
 //! edge function counts as having a sign only beyond that.
 
 use super::layout::{Block, Node, Tree};
-use super::simd::Simd;
+use super::simd::{Lanes, Simd};
 use crate::accel::tame::Tame;
 use crate::base::shape::LocalRay;
 use crate::math::aabb::{round_down, round_up};
@@ -28,33 +28,26 @@ use glam::Vec3;
 /// A ray in the space of a tree.
 #[derive(Clone, Copy)]
 pub(super) struct CullRay {
-    /// Which of the two planes of each axis the ray meets first.
-    first: [usize; 3],
-    /// 1 / d.
-    inv: Vec3,
-    /// What to add to the product with the first plane, and with the second.
-    near: Vec3,
-    far: Vec3,
-    /// The axes x, y, z of the sheared space.
-    k: [usize; 3],
-    o: Vec3,
-    d: Vec3,
+    pub(super) o: Vec3,
+    pub(super) d: Vec3,
+    pub(super) tnear: f32,
+    /// What double precision has lost of an origin far away.
+    lost: f32,
     /// The error of a sheared coordinate.
-    delta: f32,
+    pub(super) delta: f32,
     /// Culling's own t is `(t - shift) * rescale`.
     shift: f64,
     rescale: f64,
-    tnear: f32,
 }
 
-/// A ray against boxes: one number a lane, the same in all.
+/// Rays against boxes: one in each lane, or one in all.
 #[derive(Clone, Copy)]
-pub(super) struct BoxRay<S: Simd> {
-    first: [usize; 3],
-    inv: [S::V; 3],
-    near: [S::V; 3],
-    far: [S::V; 3],
-    tnear: S::V,
+pub(super) struct BoxRays<S: Simd> {
+    /// 1 / d.
+    pub(super) inv: [S::V; 3],
+    /// What to add to the product with the plane that is met first, and with the other.
+    pub(super) near: [S::V; 3],
+    pub(super) far: [S::V; 3],
 }
 
 /// A ray against triangles, likewise.
@@ -68,8 +61,8 @@ struct ShearedRay<S: Simd> {
 
 /// What eight boxes say to a ray.
 pub(super) struct Boxes<S: Simd> {
-    /// Those that it may meet, a bit each.
-    pub(super) hit: u32,
+    /// Those that it may meet, all bits of their lanes.
+    pub(super) hit: S::V,
     /// Where it enters them.
     pub(super) near: S::V,
 }
@@ -88,28 +81,11 @@ impl CullRay {
     pub(super) fn new(ray: &LocalRay, tree: &Tree) -> Option<Self> {
         let tame = Tame::new(ray, &tree.grown, tree.reach)?;
         let (o, d) = (tame.ray.o.as_vec3(), tame.ray.d.as_vec3());
-        let a = d.abs();
-        let r = tree.extent + o.abs();
-        // What double precision loses of an origin far away is no longer nothing.
         let lost = if tame.shift == 0.0 { 0.0 } else { (ray.o.abs().max_element() * 1e-15) as f32 };
-        let most = r.max_element().max(1e-30) + lost * (1.0 / U32);
-        let d_box = a.max(Vec3::splat(a.max_element() * 1e-10)).copysign(d);
-        let inv = d_box.recip();
-        let c = -(o * inv);
-        let pad = (r * (8.0 * U32) + Vec3::splat(most * 1e-9 + lost)) * inv.abs();
-        Some(CullRay {
-            first: [d_box.x, d_box.y, d_box.z].map(|d| (d.to_bits() >> 31) as usize),
-            inv,
-            near: c - pad,
-            far: c + pad,
-            k: shear_axes(a),
-            o,
-            d,
-            delta: 12.0 * U32 * most,
-            shift: tame.shift,
-            rescale: 1.0 / tame.scale,
-            tnear: round_down(tame.ray.tnear),
-        })
+        let most = (tree.extent + o.abs()).max_element().max(LEAST_EXTENT) + lost * (1.0 / U32);
+        let delta = DELTA * most;
+        let tnear = round_down(tame.ray.tnear);
+        Some(CullRay { o, d, tnear, lost, delta, shift: tame.shift, rescale: 1.0 / tame.scale })
     }
 
     /// An upper bound of culling's own t.
@@ -118,28 +94,22 @@ impl CullRay {
         round_up((t - self.shift) * self.rescale)
     }
 
-    /// For tests of boxes.
+    /// Which of the two planes of each axis the ray meets first.
     #[inline(always)]
-    pub(super) fn boxes<S: Simd>(&self) -> BoxRay<S> {
-        BoxRay {
-            first: self.first,
-            inv: splat3::<S>(self.inv),
-            near: splat3::<S>(self.near),
-            far: splat3::<S>(self.far),
-            tnear: S::splat(self.tnear),
-        }
+    pub(super) fn first(&self) -> [usize; 3] {
+        [sign(self.d.x), sign(self.d.y), sign(self.d.z)]
+    }
+
+    /// For tests of boxes, in all lanes.
+    #[inline(always)]
+    pub(super) fn boxes<S: Simd>(&self, tree: &Tree) -> BoxRays<S> {
+        BoxRays::new(splat3::<S>(self.o), splat3::<S>(self.d), tree, self.lost)
     }
 
     /// Tests the triangles of a block. `tfar` is the ray's end; whether a hit is certain is only asked where `CERTAIN`.
     #[inline(always)]
     pub(super) fn triangles<S: Simd, const CERTAIN: bool>(&self, block: &Block, tfar: f32) -> Candidates {
-        let [kx, ky, kz] = self.k;
-        let along = 1.0 / self.d[kz % 3];
-        let ray = ShearedRay::<S> {
-            k: self.k,
-            o: [S::splat(self.o[kx % 3]), S::splat(self.o[ky % 3]), S::splat(self.o[kz % 3])],
-            shear: [S::splat(self.d[kx % 3] * along), S::splat(self.d[ky % 3] * along)],
-        };
+        let (ray, along) = self.sheared::<S>();
         let (a, b, c) = (ray.corner(block, 0), ray.corner(block, 1), ray.corner(block, 2));
         let (u, v, w) = (edge::<S>(&b, &c), edge::<S>(&c, &a), edge::<S>(&a, &b));
         let least = S::min(u, S::min(v, w));
@@ -149,16 +119,57 @@ impl CullRay {
         let slack = S::mul_add(S::load(&block.size), S::splat(scale), constant);
         let minus = S::sub(S::splat(0.0), slack);
         let maybe = S::le(minus, least) | S::le(most, slack);
-        if !CERTAIN || maybe == 0 {
+        if maybe == 0 {
             return Candidates { maybe, certain: 0 };
         }
-        let inside = S::le(slack, least) | S::le(most, minus);
-        let error = 16.0 / 12.0 * self.delta * along.abs();
+        // Between which distances each triangle lies as a whole.
+        let error = S::splat(16.0 / 12.0 * self.delta * along.abs());
         let along = S::splat(along);
         let (z0, z1, z2) = (S::mul(a[2], along), S::mul(b[2], along), S::mul(c[2], along));
         let (first, last) = (S::min(z0, S::min(z1, z2)), S::max(z0, S::max(z1, z2)));
-        let within = S::le(S::splat(self.tnear + error), first) & S::le(last, S::splat(tfar - error));
+        let (tnear, tfar) = (S::splat(self.tnear), S::splat(tfar));
+        let maybe = maybe & S::le(tnear, S::add(last, error)) & S::le(S::sub(first, error), tfar);
+        if !CERTAIN {
+            return Candidates { maybe, certain: 0 };
+        }
+        let inside = S::le(slack, least) | S::le(most, minus);
+        let within = S::le(S::add(tnear, error), first) & S::le(last, S::sub(tfar, error));
         Candidates { maybe, certain: maybe & inside & within }
+    }
+
+    /// As [`CullRay::triangles`], without bounds: whatever single precision says. The triangles that are hit by its
+    /// word, and where.
+    #[inline(always)]
+    pub(super) fn triangles_by_single<S: Simd>(&self, block: &Block, tfar: f32) -> (u32, Lanes) {
+        let (ray, along) = self.sheared::<S>();
+        let (a, b, c) = (ray.corner(block, 0), ray.corner(block, 1), ray.corner(block, 2));
+        let (u, v, w) = (edge::<S>(&b, &c), edge::<S>(&c, &a), edge::<S>(&a, &b));
+        let zero = S::splat(0.0);
+        let inside = S::le(zero, S::min(u, S::min(v, w))) | S::le(S::max(u, S::max(v, w)), zero);
+        let sum = S::mul_add(u, a[2], S::mul_add(v, b[2], S::mul(w, c[2])));
+        let t = S::div(S::mul(sum, S::splat(along)), S::add(u, S::add(v, w)));
+        let held = S::le(zero, S::load(&block.size));
+        (inside & held & S::le(S::splat(self.tnear), t) & S::le(t, S::splat(tfar)), S::store(t))
+    }
+
+    /// For tests of triangles, and 1 / dz.
+    #[inline(always)]
+    fn sheared<S: Simd>(&self) -> (ShearedRay<S>, f32) {
+        let k = shear_axes(self.d.abs());
+        let [kx, ky, kz] = k;
+        let along = 1.0 / self.d[kz % 3];
+        let ray = ShearedRay::<S> {
+            k,
+            o: [S::splat(self.o[kx % 3]), S::splat(self.o[ky % 3]), S::splat(self.o[kz % 3])],
+            shear: [S::splat(self.d[kx % 3] * along), S::splat(self.d[ky % 3] * along)],
+        };
+        (ray, along)
+    }
+
+    /// Where the original ray is when culling's own t is this.
+    #[inline(always)]
+    pub(super) fn restored(&self, t: f32) -> f64 {
+        f64::from(t) / self.rescale + self.shift
     }
 }
 
@@ -171,23 +182,59 @@ fn shear_axes(a: Vec3) -> [usize; 3] {
     [(z + 1) % 3, (z + 2) % 3, z]
 }
 
-impl<S: Simd> BoxRay<S> {
+/// 1 for negative numbers, else 0.
+#[inline(always)]
+pub(super) fn sign(x: f32) -> usize {
+    (x.to_bits() >> 31) as usize
+}
+
+/// The error of a sheared coordinate over R: see the module.
+const DELTA: f32 = 12.0 * U32;
+/// R of a tree without extent, so that bounds do not vanish.
+const LEAST_EXTENT: f32 = 1e-30;
+
+impl<S: Simd> BoxRays<S> {
+    /// Rays in a tree. `lost` is an error of the origins beyond rounding.
     #[inline(always)]
-    fn enter(&self, node: &Node, axis: usize) -> S::V {
-        S::mul_add(S::load(&node.planes[axis][self.first[axis] & 1]), self.inv[axis], self.near[axis])
+    pub(super) fn new(o: [S::V; 3], d: [S::V; 3], tree: &Tree, lost: f32) -> Self {
+        let (extent, slack) = (tree.extent, tree.slack);
+        let size = S::splat(f32::from_bits(0x7fff_ffff));
+        let a = [S::and(d[0], size), S::and(d[1], size), S::and(d[2], size)];
+        let floor = S::mul(S::max(a[0], S::max(a[1], a[2])), S::splat(1e-10));
+        let r = [
+            S::add(S::and(o[0], size), S::splat(extent.x)),
+            S::add(S::and(o[1], size), S::splat(extent.y)),
+            S::add(S::and(o[2], size), S::splat(extent.z)),
+        ];
+        let most = S::max(S::max(r[0], S::splat(LEAST_EXTENT)), S::max(r[1], r[2]));
+        let rest = S::mul_add(most, S::splat(1e-9 * slack), S::splat(lost));
+        let mut out = BoxRays { inv: d, near: d, far: d };
+        for axis in 0..3 {
+            let large = S::max(a[axis], floor);
+            let inv = S::div(S::splat(1.0), large);
+            let pad = S::mul(S::mul_add(r[axis], S::splat(8.0 * U32 * slack), rest), inv);
+            out.inv[axis] = S::or(inv, S::and(d[axis], S::splat(-0.0)));
+            let c = S::mul(o[axis], out.inv[axis]);
+            out.near[axis] = S::sub(S::sub(S::splat(0.0), c), pad);
+            out.far[axis] = S::sub(pad, c);
+        }
+        out
     }
 
+    /// Tests one ray, which is in all lanes, against the boxes of a node between `tnear` and `tfar`.
     #[inline(always)]
-    fn leave(&self, node: &Node, axis: usize) -> S::V {
-        S::mul_add(S::load(&node.planes[axis][(self.first[axis] ^ 1) & 1]), self.inv[axis], self.far[axis])
-    }
-
-    /// Tests the boxes of a node up to `tfar`.
-    #[inline(always)]
-    pub(super) fn test(&self, node: &Node, tfar: S::V) -> Boxes<S> {
-        let enter = S::max(S::max(self.enter(node, 0), self.enter(node, 1)), S::max(self.enter(node, 2), self.tnear));
-        let leave = S::min(S::min(self.leave(node, 0), self.leave(node, 1)), S::min(self.leave(node, 2), tfar));
-        Boxes { hit: S::le(enter, leave), near: enter }
+    pub(super) fn test(&self, first: [usize; 3], node: &Node, tnear: S::V, tfar: S::V) -> Boxes<S> {
+        let [x, y, z] = first;
+        let p = &node.planes;
+        let ex = S::mul_add(S::load(&p[0][x & 1]), self.inv[0], self.near[0]);
+        let ey = S::mul_add(S::load(&p[1][y & 1]), self.inv[1], self.near[1]);
+        let ez = S::mul_add(S::load(&p[2][z & 1]), self.inv[2], self.near[2]);
+        let lx = S::mul_add(S::load(&p[0][(x ^ 1) & 1]), self.inv[0], self.far[0]);
+        let ly = S::mul_add(S::load(&p[1][(y ^ 1) & 1]), self.inv[1], self.far[1]);
+        let lz = S::mul_add(S::load(&p[2][(z ^ 1) & 1]), self.inv[2], self.far[2]);
+        let enter = S::max(S::max(ex, ey), S::max(ez, tnear));
+        let leave = S::min(S::min(lx, ly), S::min(lz, tfar));
+        Boxes { hit: S::le_bits(enter, leave), near: enter }
     }
 }
 
@@ -231,5 +278,73 @@ impl<'a> LevelRay<'a> {
     pub(super) fn new(tree: &'a Tree, exact: LocalRay, first_path: u64) -> Option<Self> {
         let cull = CullRay::new(&exact, tree)?;
         Some(LevelRay { tree, cull, exact, first_path })
+    }
+}
+
+/// A ray in a tree, as its leaves ask for it.
+pub(super) trait TreeRay {
+    fn tree(&self) -> &Tree;
+    fn cull(&self) -> CullRay;
+    /// As the tests that decide take it; its end means nothing.
+    fn exact(&self) -> LocalRay;
+    /// Of the first leaf of the tree's group.
+    fn first_path(&self) -> u64;
+}
+
+impl TreeRay for LevelRay<'_> {
+    #[inline(always)]
+    fn tree(&self) -> &Tree {
+        self.tree
+    }
+    #[inline(always)]
+    fn cull(&self) -> CullRay {
+        self.cull
+    }
+    #[inline(always)]
+    fn exact(&self) -> LocalRay {
+        self.exact
+    }
+    #[inline(always)]
+    fn first_path(&self) -> u64 {
+        self.first_path
+    }
+}
+
+/// A ray of render space in the root's tree that single precision carries as it is.
+#[derive(Clone, Copy)]
+pub(super) struct PlainRay<'a> {
+    pub(super) tree: &'a Tree,
+    pub(super) o: Vec3,
+    pub(super) d: Vec3,
+    pub(super) tnear: f32,
+}
+
+impl TreeRay for PlainRay<'_> {
+    #[inline(always)]
+    fn tree(&self) -> &Tree {
+        self.tree
+    }
+    #[inline(always)]
+    fn cull(&self) -> CullRay {
+        let most = (self.tree.extent + self.o.abs()).max_element().max(LEAST_EXTENT);
+        let delta = DELTA * most;
+        CullRay { o: self.o, d: self.d, tnear: self.tnear, lost: 0.0, delta, shift: 0.0, rescale: 1.0 }
+    }
+    #[inline(always)]
+    fn exact(&self) -> LocalRay {
+        let (o, d) = (self.o.as_dvec3(), self.d.as_dvec3());
+        LocalRay { o, d, tnear: f64::from(self.tnear), tfar: f64::INFINITY }
+    }
+    #[inline(always)]
+    fn first_path(&self) -> u64 {
+        0
+    }
+}
+
+impl<'a> PlainRay<'a> {
+    /// The same, for searches that may leave the root's tree.
+    #[inline(always)]
+    pub(super) fn level(&self) -> LevelRay<'a> {
+        LevelRay { tree: self.tree, cull: self.cull(), exact: self.exact(), first_path: 0 }
     }
 }

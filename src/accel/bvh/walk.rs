@@ -1,26 +1,22 @@
 //! One ray through one tree.
 
-use super::layout::{Block, Child, Target};
-use super::ray::LevelRay;
-use super::simd::{LANES, Simd};
-use crate::accel::{accepted, first_crossing, failure::Failure};
-use crate::base::geometry::Group;
+use super::layout::{Child, Node, Target, Tree};
+use super::ray::{Boxes, LevelRay, TreeRay};
+use super::simd::{LANES, Lanes, Simd};
+use crate::accel::{accepted, failure::Failure, first_crossing};
+use crate::base::geometry::{Group, Leaf};
 use crate::base::hit::Hit;
 use crate::base::intersectable::Visits;
 use crate::base::shape::LocalRay;
 use crate::math::triangle::TriangleRay;
+use bytemuck::{cast_ref, cast_slice_mut};
 
-/// A child, and where the ray enters its box.
-#[derive(Clone, Copy)]
-pub(super) struct Waiting {
-    child: Child,
-    near: f32,
-}
-
-/// The stack of a search. Levels of nesting share it: each counts from where it began.
+/// The children that wait for their turn in a search. Levels of nesting share it: each counts from where it began.
 #[derive(Default)]
 pub(super) struct Stack {
-    waiting: Vec<Waiting>,
+    children: Vec<Child>,
+    /// Where the ray enters their boxes.
+    near: Vec<f32>,
     /// How many wait.
     pub(super) len: usize,
 }
@@ -29,41 +25,56 @@ impl Stack {
     /// Makes room for what a tree may leave waiting.
     #[inline(always)]
     pub(super) fn reserve(&mut self, more: usize) {
-        if self.waiting.len() < self.len + more {
+        if self.near.len() < self.len + more + LANES {
             self.grow(more);
         }
     }
 
     #[cold]
     fn grow(&mut self, more: usize) {
-        self.waiting.resize((self.len + more).next_power_of_two(), Waiting { child: Child::NONE, near: 0.0 });
+        let room = (self.len + more + LANES).next_power_of_two();
+        self.children.resize(room, Child::NONE);
+        self.near.resize(room, 0.0);
     }
 
     #[inline(always)]
     pub(super) fn push(&mut self, child: Child, near: f32) {
-        self.waiting[self.len] = Waiting { child, near };
+        self.children[self.len] = child;
+        self.near[self.len] = near;
         self.len += 1;
     }
 
+    /// Pushes the lanes of a set, without a branch: how many those are cannot be predicted.
     #[inline(always)]
-    fn pop(&mut self) -> Waiting {
-        self.len -= 1;
-        self.waiting[self.len]
+    fn push_lanes<S: Simd>(&mut self, node: &Node, near: S::V, set: u32) {
+        let end = self.len + LANES;
+        let children = S::compress(S::load(cast_ref(&node.children)), set);
+        let to: &mut [f32] = cast_slice_mut(&mut self.children[self.len..end]);
+        to.copy_from_slice(&children.0);
+        self.near[self.len..end].copy_from_slice(&S::compress(near, set).0);
+        self.len += set.count_ones() as usize;
     }
 
     /// Brings those from `first` on into the order in which they shall be popped: the nearest last.
     #[inline(always)]
     fn sort(&mut self, first: usize) {
-        let part = &mut self.waiting[first..self.len];
-        for i in 1..part.len() {
-            let it = part[i];
+        let (near, children) = (&mut self.near[first..self.len], &mut self.children[first..self.len]);
+        for i in 1..near.len().min(children.len()) {
+            let it = (near[i], children[i]);
             let mut j = i;
-            while j > 0 && part[j - 1].near < it.near {
-                part[j] = part[j - 1];
+            while j > 0 && near[j - 1] < it.0 {
+                (near[j], children[j]) = (near[j - 1], children[j - 1]);
                 j -= 1;
             }
-            part[j] = it;
+            (near[j], children[j]) = it;
         }
+    }
+
+    /// The last one that waits; none if it lies beyond `end`.
+    #[inline(always)]
+    pub(super) fn pop_before(&mut self, end: f32) -> Option<Child> {
+        self.len -= 1;
+        (self.near[self.len] <= end).then_some(self.children[self.len])
     }
 }
 
@@ -78,8 +89,10 @@ pub(super) struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    pub(super) fn new(ray: &LocalRay, key: u32, failure: &'a Failure) -> Self {
-        Search { t: ray.tfar, found: None, key, failure }
+    /// For a ray that ends at `t`.
+    #[inline(always)]
+    pub(super) fn ending(t: f64, key: u32, failure: &'a Failure) -> Self {
+        Search { t, found: None, key, failure }
     }
 
     /// Takes a hit at `t`, which lies between the ray's ends, if it is the closest; of several at one distance the one
@@ -87,7 +100,8 @@ impl<'a> Search<'a> {
     #[inline(always)]
     fn offer(&mut self, t: f64, prim: u32, path: u64) -> bool {
         let closer = t < self.t
-            || t == self.t && self.found.is_none_or(|(old_prim, old_path)| (path, prim) < (old_path, old_prim));
+            || t == self.t
+                && self.found.is_none_or(|(old_prim, old_path)| (path, prim) < (old_path, old_prim));
         if closer {
             self.t = t;
             self.found = Some((prim, path));
@@ -137,77 +151,26 @@ pub(super) fn walk<S: Simd, C: Counter, const ANY: bool>(
     base: usize,
     count: &mut C,
 ) -> Stop {
-    let nodes = &ray.tree.nodes[..];
-    let box_ray = ray.cull.boxes::<S>();
+    let nodes = ray.tree.nodes();
+    let (boxes, first, tnear) = (ray.cull.boxes::<S>(ray.tree), ray.cull.first(), S::splat(ray.cull.tnear));
     let mut end = ray.cull.end(search.t);
     let mut tfar = S::splat(end);
     'next: while stack.len > base {
-        let Waiting { mut child, near } = stack.pop();
-        if near > end {
-            continue;
-        }
+        let Some(mut child) = stack.pop_before(end) else { continue };
         while child.is_node() {
             count.node();
             let node = &nodes[child.index()];
-            let boxes = box_ray.test(node, tfar);
-            let mut hit = boxes.hit;
-            if hit == 0 {
-                continue 'next;
+            let hit = boxes.test(first, node, tnear, tfar);
+            match choose::<S, ANY>(ray.tree, node, &hit, stack) {
+                Some(nearest) => child = nearest,
+                None => continue 'next,
             }
-            let first = hit.trailing_zeros() as usize;
-            hit &= hit - 1;
-            child = node.children[first % LANES];
-            if hit == 0 {
-                continue;
-            }
-            if ANY {
-                // What is found first is as good as what is nearest.
-                while hit != 0 {
-                    let lane = hit.trailing_zeros() as usize;
-                    hit &= hit - 1;
-                    stack.push(node.children[lane % LANES], f32::NEG_INFINITY);
-                }
-                continue;
-            }
-            let second = hit.trailing_zeros() as usize;
-            hit &= hit - 1;
-            let near = S::store(boxes.near).0;
-            let (d0, d1) = (near[first % LANES], near[second % LANES]);
-            if hit == 0 {
-                let (c0, c1) = (child, node.children[second % LANES]);
-                if d0 <= d1 {
-                    stack.push(c1, d1);
-                } else {
-                    stack.push(c0, d0);
-                    child = c1;
-                }
-                continue;
-            }
-            let from = stack.len;
-            stack.push(child, d0);
-            stack.push(node.children[second % LANES], d1);
-            while hit != 0 {
-                let lane = hit.trailing_zeros() as usize;
-                hit &= hit - 1;
-                stack.push(node.children[lane % LANES], near[lane % LANES]);
-            }
-            stack.sort(from);
-            child = stack.pop().child;
         }
-        let closer = match child.target() {
-            Target::Block(i) => {
-                let block = &ray.tree.blocks[i];
-                count.leaf(|| block.count());
-                triangles::<S, ANY>(ray, group, search, block, i, end)
-            }
-            Target::Shapes(first, n) => {
-                count.leaf(|| n as u64);
-                shapes(ray, group, search, first, n)
-            }
-            Target::Instance(i) => return Stop::At(i),
-            Target::Node(_) => false,
-        };
-        if closer {
+        if let Target::Instance(i) = child.target() {
+            return Stop::At(i);
+        }
+        count.leaf(|| primitives(ray, child));
+        if leaf_of::<S, ANY>(ray, group, search, child, end) {
             if ANY {
                 return Stop::Done;
             }
@@ -218,39 +181,164 @@ pub(super) fn walk<S: Simd, C: Counter, const ANY: bool>(
     Stop::Done
 }
 
+/// The child to visit next, of those whose boxes are hit: the nearest. The others wait on the stack, the nearest last.
+#[inline(always)]
+fn choose<S: Simd, const ANY: bool>(
+    tree: &Tree,
+    node: &Node,
+    boxes: &Boxes<S>,
+    stack: &mut Stack,
+) -> Option<Child> {
+    let mut hit = S::bits(boxes.hit);
+    if hit == 0 {
+        return None;
+    }
+    let first = hit.trailing_zeros() as usize;
+    hit &= hit - 1;
+    let child = node.children.0[first % LANES];
+    tree.fetch::<S>(child);
+    if hit == 0 {
+        return Some(child);
+    }
+    if ANY {
+        // What is found first is as good as what is nearest.
+        while hit != 0 {
+            let lane = hit.trailing_zeros() as usize;
+            hit &= hit - 1;
+            let child = node.children.0[lane % LANES];
+            tree.fetch::<S>(child);
+            stack.push(child, f32::NEG_INFINITY);
+        }
+        return Some(child);
+    }
+    let near = S::store(boxes.near).0;
+    let second = hit.trailing_zeros() as usize;
+    hit &= hit - 1;
+    let (d0, d1) = (near[first % LANES], near[second % LANES]);
+    let other = node.children.0[second % LANES];
+    tree.fetch::<S>(other);
+    if hit == 0 {
+        let (nearest, (child, near)) = if d0 <= d1 { (child, (other, d1)) } else { (other, (child, d0)) };
+        stack.push(child, near);
+        return Some(nearest);
+    }
+    let from = stack.len;
+    stack.push(child, d0);
+    stack.push(other, d1);
+    while hit != 0 {
+        let lane = hit.trailing_zeros() as usize;
+        hit &= hit - 1;
+        let child = node.children.0[lane % LANES];
+        tree.fetch::<S>(child);
+        stack.push(child, near[lane % LANES]);
+    }
+    stack.sort(from);
+    stack.len -= 1;
+    Some(stack.children[stack.len])
+}
+
+/// As `choose`, without a branch on how many are hit, and so without order among the others: for rays that take turns, whose
+/// next visit is not waited for, so that mispredicted branches are what costs.
+#[inline(always)]
+pub(super) fn choose_one<S: Simd, const ANY: bool>(
+    node: &Node,
+    boxes: &Boxes<S>,
+    stack: &mut Stack,
+) -> Option<Child> {
+    let hit = S::bits(boxes.hit);
+    if hit == 0 {
+        return None;
+    }
+    let lane = if ANY {
+        // What is found first is as good as what is nearest.
+        hit.trailing_zeros() as usize
+    } else {
+        // Distances are not negative, so their order is that of their bits; the last three hold the lane.
+        let keys = S::or(S::and(boxes.near, S::splat(f32::from_bits(!7))), S::load(&LANE_BITS));
+        S::least(S::select(boxes.hit, keys, S::splat(f32::INFINITY))).to_bits() as usize
+    } % LANES;
+    stack.push_lanes::<S>(node, boxes.near, hit & !(1 << lane));
+    Some(node.children.0[lane])
+}
+
+/// The numbers of the lanes, as bits.
+static LANE_BITS: Lanes = {
+    let mut lanes = Lanes([0.0; LANES]);
+    let mut i = 0;
+    while i < LANES {
+        lanes.0[i] = f32::from_bits(i as u32);
+        i += 1;
+    }
+    lanes
+};
+
+/// How many primitives a leaf holds.
+fn primitives(ray: &LevelRay, child: Child) -> u64 {
+    match child.target() {
+        Target::Block(i) => ray.tree.blocks()[i].count(),
+        Target::Shapes(_, n) => n as u64,
+        Target::Node(_) | Target::Instance(_) => 0,
+    }
+}
+
+/// Whether a primitive of a leaf is the closest hit now, or any hit. `end` is the ray's end, for culling.
+#[inline(always)]
+pub(super) fn leaf_of<S: Simd, const ANY: bool>(
+    ray: &impl TreeRay,
+    group: &Group,
+    search: &mut Search,
+    child: Child,
+    end: f32,
+) -> bool {
+    match child.target() {
+        Target::Block(i) => triangles::<S, ANY>(ray, group, search, i, end),
+        Target::Shapes(first, n) => {
+            let tree = ray.tree();
+            shapes(tree, &ray.exact(), group, ray.first_path(), search, first, n)
+        }
+        Target::Node(_) | Target::Instance(_) => false,
+    }
+}
+
 /// Whether one of a block's triangles is the closest hit now, or any hit.
 #[inline(always)]
 fn triangles<S: Simd, const ANY: bool>(
-    ray: &LevelRay,
+    ray: &impl TreeRay,
     group: &Group,
     search: &mut Search,
-    block: &Block,
     index: usize,
     end: f32,
 ) -> bool {
-    let candidates =
-        if ANY { ray.cull.triangles::<S, true>(block, end) } else { ray.cull.triangles::<S, false>(block, end) };
-    if ANY && candidates.certain != 0 && !ray.tree.has_filters {
-        search.found = Some((0, 0));
-        return true;
+    let tree = ray.tree();
+    let block = &tree.blocks()[index];
+    if tree.slack == 0.0 {
+        return triangles_by_single::<S>(ray, group, search, index, end);
     }
+    let candidates = ray.cull().triangles::<S, ANY>(block, end);
     let mut maybe = candidates.maybe;
     if maybe == 0 {
         return false;
     }
-    let test = TriangleRay::new(ray.exact.o, ray.exact.d);
+    if ANY && candidates.certain != 0 && !tree.has_filters {
+        search.found = Some((0, 0));
+        return true;
+    }
+    S::prefetch(&tree.ids()[index]);
+    let exact = ray.exact();
+    let test = TriangleRay::new(exact.o, exact.d);
     let mut closer = false;
     while maybe != 0 {
         let lane = maybe.trailing_zeros() as usize;
         maybe &= maybe - 1;
         // NaN, of a ray within the triangle's plane, is no hit.
-        let Some(t) = test.distance(block.corners(lane)) else { continue };
-        if !(t >= ray.exact.tnear && t <= search.t) {
+        let Some(t) = test.distance_by_axes(block.corners(lane, test.axes())) else { continue };
+        if !(t >= exact.tnear && t <= search.t) {
             continue;
         }
-        let owner = ray.tree.owner(index, lane);
-        let (prim, path) = (ray.tree.ids[index].prim[lane % LANES], ray.first_path + u64::from(owner));
-        if ray.tree.has_filters && !stands(ray, group, search, owner, t, prim, path) {
+        let owner = tree.owner(index, lane);
+        let (prim, path) = (tree.ids()[index].prim[lane % LANES], ray.first_path() + u64::from(owner));
+        let hit = Hit { t: t as f32, prim, path };
+        if tree.has_filters && !stands(&exact, &group.leaves[owner as usize], search, &hit) {
             continue;
         }
         closer |= search.offer(t, prim, path);
@@ -261,38 +349,56 @@ fn triangles<S: Simd, const ANY: bool>(
     closer
 }
 
+/// The same in the mode that is fast and not strict. It takes the first of several at one distance, in any order.
+#[inline(always)]
+fn triangles_by_single<S: Simd>(
+    ray: &impl TreeRay,
+    group: &Group,
+    search: &mut Search,
+    index: usize,
+    end: f32,
+) -> bool {
+    let (tree, cull) = (ray.tree(), ray.cull());
+    let (mut hits, t) = cull.triangles_by_single::<S>(&tree.blocks()[index], end);
+    let mut closer = false;
+    while hits != 0 {
+        let lane = hits.trailing_zeros() as usize % LANES;
+        hits &= hits - 1;
+        let owner = tree.owner(index, lane);
+        let (prim, path) = (tree.ids()[index].prim[lane], ray.first_path() + u64::from(owner));
+        let t = cull.restored(t.0[lane]);
+        let hit = Hit { t: t as f32, prim, path };
+        if !tree.has_filters || stands(&ray.exact(), &group.leaves[owner as usize], search, &hit) {
+            closer |= search.offer(t, prim, path);
+        }
+    }
+    closer
+}
+
 /// Asks the filter of a mesh whether a hit counts.
 #[cold]
-fn stands(
-    ray: &LevelRay,
-    group: &Group,
-    search: &Search,
-    owner: u32,
-    t: f64,
-    prim: u32,
-    path: u64,
-) -> bool {
+fn stands(exact: &LocalRay, leaf: &Leaf, search: &Search, hit: &Hit) -> bool {
     let mut stands = false;
-    let leaf = &group.leaves[owner as usize];
-    let hit = Hit { t: t as f32, prim, path };
-    search.failure.guard(|| stands = accepted(leaf, &ray.exact, &hit, search.key));
+    search.failure.guard(|| stands = accepted(leaf, exact, hit, search.key));
     stands
 }
 
 /// Whether one of some primitives, tested by their shapes' own code, is the closest hit now.
 #[inline(never)]
 fn shapes(
-    ray: &LevelRay,
+    tree: &Tree,
+    exact: &LocalRay,
     group: &Group,
+    first_path: u64,
     search: &mut Search,
     first: usize,
     n: usize,
 ) -> bool {
     let mut closer = false;
-    for p in &ray.tree.shapes[first..first + n] {
-        let path = ray.first_path + u64::from(p.leaf);
+    for p in &tree.shapes[first..first + n] {
+        let path = first_path + u64::from(p.leaf);
         let leaf = &group.leaves[p.leaf as usize];
-        let shortened = LocalRay { tfar: search.t, ..ray.exact };
+        let shortened = LocalRay { tfar: search.t, ..*exact };
         let mut t = None;
         search.failure.guard(|| t = first_crossing(leaf, &shortened, p.prim, path, search.key));
         closer |= t.is_some_and(|t| search.offer(t, p.prim, path));

@@ -6,6 +6,7 @@ use crate::base::shape::{LocalRay, Needs, Shape, ShapeSample, Surface};
 use crate::error::Result;
 use crate::math::aabb::{Aabb, DAabb};
 use crate::math::quadric::unit_sphere_roots;
+use crate::math::triangle::TriangleRay;
 use glam::{DAffine3, DVec3, Vec3};
 use std::sync::Arc;
 
@@ -36,7 +37,7 @@ macro_rules! not_for_kernels {
     };
 }
 
-/// A mesh tested in double precision, watertight: the three edge functions of neighbours are exact negatives.
+/// A mesh.
 pub struct Mesh(pub TriangleMesh);
 
 impl Shape for Mesh {
@@ -60,22 +61,8 @@ impl Shape for Mesh {
         Some(&self.0)
     }
 
-    // After Woop, Benthin, Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013, in double precision.
     fn intersect(&self, ray: &LocalRay, prim: u32) -> Option<f64> {
-        let d = ray.d;
-        let z = (0..3).max_by(|&a, &b| d[a].abs().total_cmp(&d[b].abs()))?;
-        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
-        let [a, b, c] = self.0.corners(prim).map(|p| {
-            let p = p.as_dvec3() - ray.o;
-            DVec3::new(p[x] - d[x] / d[z] * p[z], p[y] - d[y] / d[z] * p[z], p[z] / d[z])
-        });
-        let [u, v, w] = [c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x];
-        let det = u + v + w;
-        let mixed = (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0);
-        if mixed || det == 0.0 {
-            return None;
-        }
-        let t = (u * a.z + v * b.z + w * c.z) / det;
+        let t = TriangleRay::new(ray.o, ray.d).distance(self.0.corners(prim).map(|p| p.as_dvec3()))?;
         (t >= ray.tnear && t <= ray.tfar).then_some(t)
     }
 

@@ -8,13 +8,13 @@ use super::layout::{Child, Node, Target, Tree};
 use super::simd::LANES;
 use crate::accel::tame::{grown, reach};
 use crate::base::geometry::{Child as Placed, Geometry, Group};
-use crate::base::intersectable::{BuildQuality, KernelOptions};
+use crate::base::intersectable::{BuildQuality, KernelMode, KernelOptions};
 use crate::error::{Error, Result};
 use crate::math::aabb::Aabb;
 use rayon::prelude::*;
 use refs::{Kind, MAX_LEAVES, Ref};
 use split::{Set, Units};
-use wide::{Part, Plan, build_top};
+use wide::{Plan, build_top};
 
 /// The trees of all groups, in their order.
 pub(super) fn build(geometry: &Geometry, options: &KernelOptions) -> Result<Vec<Tree>> {
@@ -28,11 +28,9 @@ fn tree(geometry: &Geometry, group: &Group, options: &KernelOptions) -> Result<T
     }
     let mut refs = references(geometry, group)?;
     let meshes: Vec<usize> = (0..group.leaves.len()).filter(|&i| is_mesh(group, i)).collect();
-    let mut tree = Tree {
-        only_mesh: meshes.first().map_or(0, |&i| i as u32),
-        has_filters: meshes.iter().any(|&i| group.leaves[i].filter.is_some()),
-        ..Tree::default()
-    };
+    let mut tree = Tree::empty();
+    tree.only_mesh = meshes.first().map_or(0, |&i| i as u32);
+    tree.has_filters = meshes.iter().any(|&i| group.leaves[i].filter.is_some());
     if refs.is_empty() {
         return Ok(tree);
     }
@@ -52,13 +50,11 @@ fn tree(geometry: &Geometry, group: &Group, options: &KernelOptions) -> Result<T
     tree.grown = grown(tree.bounds);
     tree.extent = tree.bounds.min.abs().max(tree.bounds.max.abs());
     tree.reach = reach(tree.bounds);
+    tree.slack = if options.mode == KernelMode::Fast { 0.0 } else { 1.0 };
     let top = build_top(&mut refs, set, &plan)?;
     drop(refs);
-    let mut part = Part::default();
-    tree.root = Some(top.flatten(&mut part)?);
-    let Part { nodes, blocks, ids, owners, shapes, instances } = part;
-    tree = Tree { nodes, blocks, ids, owners, shapes, instances, ..tree };
-    tree.waiting = 8 * depth(&tree.nodes, tree.root) + 1;
+    top.assemble(&mut tree)?;
+    tree.waiting = 8 * depth(tree.nodes(), tree.root) + 1;
     Ok(tree)
 }
 
@@ -74,7 +70,8 @@ fn references(geometry: &Geometry, group: &Group) -> Result<Vec<Ref>> {
         match leaf.shape.triangles() {
             Some(mesh) => {
                 let count = u32::try_from(mesh.indices.len());
-                let count = count.map_err(|_| Error::Usage("a mesh of more than 2^32 triangles".to_owned()))?;
+                let count =
+                    count.map_err(|_| Error::Usage("a mesh of more than 2^32 triangles".to_owned()))?;
                 let one = |t: u32| Ref::new(&Aabb::from_points(mesh.corners(t)), Kind::Triangle(i, t));
                 refs.par_extend((0..count).into_par_iter().map(one));
             }
@@ -110,7 +107,7 @@ fn depth(nodes: &[Node], root: Option<Child>) -> usize {
     while let Some((child, depth)) = waiting.pop() {
         if let Target::Node(i) = child.target() {
             deepest = deepest.max(depth);
-            let below = nodes[i].children.iter().filter(|c| **c != Child::NONE);
+            let below = nodes[i].children.0.iter().filter(|c| **c != Child::NONE);
             waiting.extend(below.map(|c| (*c, depth + 1)));
         }
     }

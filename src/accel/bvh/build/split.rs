@@ -177,7 +177,13 @@ pub(super) fn split(refs: &mut [Ref], set: &Set, bins: usize, units: Units) -> [
     // All centers in one place, or too deep: by number. Sorted along the longest axis, if that has any length.
     let middle = part.len() / 2;
     let size = set.centers.hi - set.centers.lo;
-    let axis = if size.x >= size.y && size.x >= size.z { 0 } else if size.y >= size.z { 1 } else { 2 };
+    let axis = if size.x >= size.y && size.x >= size.z {
+        0
+    } else if size.y >= size.z {
+        1
+    } else {
+        2
+    };
     if size[axis] > 0.0 {
         part.select_nth_unstable_by(middle, |a, b| a.center2()[axis].total_cmp(&b.center2()[axis]));
     }

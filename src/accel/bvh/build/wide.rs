@@ -4,13 +4,15 @@
 use super::refs::{Kind, Ref};
 use super::split::{Set, Units, split};
 use crate::accel::bvh::layout::{
-    Block, BlockIds, Child, Instance, MAX_INDEX, MAX_SHAPES, Node, ShapePrimitive, Target,
+    Block, BlockIds, Child, Instance, MAX_INDEX, MAX_SHAPES, Node, ShapePrimitive, Target, Tree,
 };
 use crate::accel::bvh::simd::LANES;
 use crate::base::geometry::Group;
 use crate::error::{Error, Result};
 use crate::math::aabb::Aabb;
+use crate::math::pages::Pages;
 use rayon::prelude::*;
+use std::sync::{Mutex, PoisonError};
 
 /// Sets of at least so many are built by several threads.
 const PARALLEL: usize = 1 << 14;
@@ -38,34 +40,6 @@ pub(super) struct Part {
     pub(super) instances: Vec<Instance>,
 }
 
-impl Part {
-    /// Appends `o`, whose root is `child`, and returns where that is now.
-    fn append(&mut self, mut o: Part, child: Child) -> Result<Child> {
-        let (nodes, blocks) = (self.nodes.len(), self.blocks.len());
-        let (shapes, instances) = (self.shapes.len(), self.instances.len());
-        let most = (nodes + o.nodes.len())
-            .max(blocks + o.blocks.len())
-            .max(shapes + o.shapes.len())
-            .max(instances + o.instances.len());
-        if most > MAX_INDEX {
-            return Err(too_many());
-        }
-        let moved = |c: Child| c.moved(nodes, blocks, shapes, instances);
-        for node in &mut o.nodes {
-            for c in &mut node.children {
-                *c = moved(*c);
-            }
-        }
-        self.nodes.append(&mut o.nodes);
-        self.blocks.append(&mut o.blocks);
-        self.ids.append(&mut o.ids);
-        self.owners.append(&mut o.owners);
-        self.shapes.append(&mut o.shapes);
-        self.instances.append(&mut o.instances);
-        Ok(moved(child))
-    }
-}
-
 fn too_many() -> Error {
     Error::Usage(format!("a group holds more than {MAX_INDEX} leaves; split it into several"))
 }
@@ -78,19 +52,124 @@ pub(super) enum Top {
     Part(Part, Child),
 }
 
+/// Where the arrays of a part begin in those of the tree.
+#[derive(Debug, Clone, Copy, Default)]
+struct Start {
+    nodes: usize,
+    blocks: usize,
+    shapes: usize,
+    instances: usize,
+}
+
+impl Start {
+    fn after(self, p: &Part) -> Start {
+        Start {
+            nodes: self.nodes + p.nodes.len(),
+            blocks: self.blocks + p.blocks.len(),
+            shapes: self.shapes + p.shapes.len(),
+            instances: self.instances + p.instances.len(),
+        }
+    }
+
+    fn moved(self, child: Child) -> Child {
+        child.moved(self.nodes, self.blocks, self.shapes, self.instances)
+    }
+}
+
 impl Top {
-    /// Puts the parts together, in order.
-    pub(super) fn flatten(self, into: &mut Part) -> Result<Child> {
+    /// The nodes above all parts, and the parts in order.
+    fn take_apart(self, upper: &mut usize, parts: &mut Vec<(Part, Child)>) -> Shape {
         match self {
-            Top::Part(part, root) => into.append(part, root),
+            Top::Part(part, root) => {
+                parts.push((part, root));
+                Shape::Part(parts.len() - 1)
+            }
             Top::Node(children) => {
-                let index = into.nodes.len();
-                into.nodes.push(Node::empty());
-                for (lane, (bounds, top)) in children.into_iter().enumerate() {
-                    let child = top.flatten(into)?;
-                    into.nodes[index].set(lane, &bounds, child);
+                *upper += 1;
+                Shape::Node(children.into_iter().map(|(b, t)| (b, t.take_apart(upper, parts))).collect())
+            }
+        }
+    }
+
+    /// Puts the parts together into a tree's arrays, by all threads.
+    pub(super) fn assemble(self, tree: &mut Tree) -> Result<()> {
+        let (mut upper, mut parts) = (0, Vec::new());
+        let shape = self.take_apart(&mut upper, &mut parts);
+        let mut starts = Vec::with_capacity(parts.len());
+        let mut next = Start { nodes: upper, ..Start::default() };
+        for (part, _) in &parts {
+            starts.push(next);
+            next = next.after(part);
+        }
+        if next.nodes.max(next.blocks).max(next.shapes).max(next.instances) > MAX_INDEX {
+            return Err(too_many());
+        }
+        let roots: Vec<Child> = parts.iter().zip(&starts).map(|((_, root), s)| s.moved(*root)).collect();
+        let mut top = Vec::with_capacity(upper);
+        tree.root = Some(shape.write(&roots, &mut top));
+        for (part, _) in &mut parts {
+            tree.owners.append(&mut part.owners);
+            tree.shapes.append(&mut part.shapes);
+            tree.instances.append(&mut part.instances);
+        }
+        // Each array of a part is given up when it has been copied.
+        let nodes = take_all(&mut parts, |p| &mut p.nodes);
+        let lengths: Vec<usize> = [upper].into_iter().chain(nodes.iter().map(|n| n.1)).collect();
+        let node_pages = Pages::from_parts(&lengths, |i, to| match i.checked_sub(1) {
+            None => to.copy_from_slice(&top),
+            Some(part) => {
+                to.copy_from_slice(&nodes[part].take());
+                let children = to.iter_mut().flat_map(|n| &mut n.children.0);
+                children.for_each(|c| *c = starts[part].moved(*c));
+            }
+        });
+        let blocks = take_all(&mut parts, |p| &mut p.blocks);
+        let lengths: Vec<usize> = blocks.iter().map(|b| b.1).collect();
+        let block_pages = Pages::from_parts(&lengths, |i, to| to.copy_from_slice(&blocks[i].take()));
+        let ids = take_all(&mut parts, |p| &mut p.ids);
+        let id_pages = Pages::from_parts(&lengths, |i, to| to.copy_from_slice(&ids[i].take()));
+        tree.fill((node_pages, next.nodes), (block_pages, next.blocks), id_pages);
+        Ok(())
+    }
+}
+
+/// An array that one thread takes, and its length.
+struct Taken<T>(Mutex<Vec<T>>, usize);
+
+impl<T> Taken<T> {
+    fn take(&self) -> Vec<T> {
+        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+fn take_all<T>(parts: &mut [(Part, Child)], of: impl Fn(&mut Part) -> &mut Vec<T>) -> Vec<Taken<T>> {
+    let take = |(part, _): &mut (Part, Child)| {
+        let array = std::mem::take(of(part));
+        let n = array.len();
+        Taken(Mutex::new(array), n)
+    };
+    parts.iter_mut().map(take).collect()
+}
+
+/// The nodes above all parts.
+enum Shape {
+    Node(Vec<(Aabb, Shape)>),
+    Part(usize),
+}
+
+impl Shape {
+    /// Writes nodes in order; `roots` are those of the parts.
+    fn write(&self, roots: &[Child], to: &mut Vec<Node>) -> Child {
+        match self {
+            Shape::Part(i) => roots[*i],
+            Shape::Node(children) => {
+                let index = to.len();
+                to.push(Node::empty());
+                for (lane, (bounds, shape)) in children.iter().enumerate() {
+                    let child = shape.write(roots, to);
+                    to[index].set(lane, bounds, child);
                 }
-                Ok(Child::new(Target::Node(index)))
+                Child::new(Target::Node(index))
             }
         }
     }

@@ -43,6 +43,10 @@ impl Simd for Avx2 {
         op!(_mm256_mul_ps(a, b))
     }
     #[inline(always)]
+    fn div(a: __m256, b: __m256) -> __m256 {
+        op!(_mm256_div_ps(a, b))
+    }
+    #[inline(always)]
     fn mul_add(a: __m256, b: __m256, c: __m256) -> __m256 {
         op!(_mm256_fmadd_ps(a, b, c))
     }
@@ -65,6 +69,45 @@ impl Simd for Avx2 {
     #[inline(always)]
     fn le(a: __m256, b: __m256) -> u32 {
         op!(_mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)) as u32)
+    }
+    #[inline(always)]
+    fn le_bits(a: __m256, b: __m256) -> __m256 {
+        op!(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b))
+    }
+    #[inline(always)]
+    fn and(a: __m256, b: __m256) -> __m256 {
+        op!(_mm256_and_ps(a, b))
+    }
+    #[inline(always)]
+    fn or(a: __m256, b: __m256) -> __m256 {
+        op!(_mm256_or_ps(a, b))
+    }
+    #[inline(always)]
+    fn select(bits: __m256, a: __m256, b: __m256) -> __m256 {
+        op!(_mm256_blendv_ps(b, a, bits))
+    }
+    #[inline(always)]
+    fn bits(a: __m256) -> u32 {
+        op!(_mm256_movemask_ps(a) as u32)
+    }
+    #[inline(always)]
+    fn least(a: __m256) -> f32 {
+        op!({
+            let a = _mm_min_ps(_mm256_castps256_ps128(a), _mm256_extractf128_ps::<1>(a));
+            let a = _mm_min_ps(a, _mm_movehl_ps(a, a));
+            _mm_cvtss_f32(_mm_min_ss(a, _mm_movehdup_ps(a)))
+        })
+    }
+    #[inline(always)]
+    fn compress(a: __m256, set: u32) -> Lanes {
+        let order = u64::from_le_bytes(super::COMPRESSED[set as usize % 256]);
+        Self::store(op!(_mm256_permutevar8x32_ps(a, _mm256_cvtepu8_epi32(_mm_cvtsi64_si128(order as i64)))))
+    }
+    #[inline(always)]
+    fn prefetch<T>(it: &T) {
+        for line in (0..size_of::<T>()).step_by(64) {
+            op!(_mm_prefetch::<_MM_HINT_T0>(std::ptr::from_ref(it).cast::<i8>().wrapping_add(line)))
+        }
     }
 }
 

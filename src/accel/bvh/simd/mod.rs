@@ -8,17 +8,18 @@ mod avx2;
 mod portable;
 #[cfg(target_arch = "x86_64")]
 mod sse42;
-
-
+#[cfg(test)]
+mod tests;
 
 use crate::error::{Error, Result};
 use crate::math::simd::Level;
+use bytemuck::{Pod, Zeroable};
 
 /// Lanes of a vector.
 pub(super) const LANES: usize = 8;
 
 /// Eight numbers where vectors are loaded from and stored to.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub(super) struct Lanes(pub(super) [f32; LANES]);
 
@@ -34,6 +35,7 @@ pub(super) trait Simd: Copy {
     fn add(a: Self::V, b: Self::V) -> Self::V;
     fn sub(a: Self::V, b: Self::V) -> Self::V;
     fn mul(a: Self::V, b: Self::V) -> Self::V;
+    fn div(a: Self::V, b: Self::V) -> Self::V;
     /// a b + c, rounded once or twice.
     fn mul_add(a: Self::V, b: Self::V, c: Self::V) -> Self::V;
     /// a b - c, rounded once or twice.
@@ -46,7 +48,39 @@ pub(super) trait Simd: Copy {
     fn max(a: Self::V, b: Self::V) -> Self::V;
     /// Bit i: whether a <= b in lane i.
     fn le(a: Self::V, b: Self::V) -> u32;
+    /// All bits of lane i: whether a <= b there.
+    fn le_bits(a: Self::V, b: Self::V) -> Self::V;
+    fn and(a: Self::V, b: Self::V) -> Self::V;
+    fn or(a: Self::V, b: Self::V) -> Self::V;
+    /// `a` where the bits of the lane are set, else `b`.
+    fn select(bits: Self::V, a: Self::V, b: Self::V) -> Self::V;
+    /// Bit i: whether the topmost bit of lane i is set.
+    fn bits(a: Self::V) -> u32;
+    /// The smallest of the lanes, none of which is NaN.
+    fn least(a: Self::V) -> f32;
+    /// The lanes of a set, moved together to the front; what follows them means nothing.
+    fn compress(a: Self::V, set: u32) -> Lanes;
+    /// Asks for all cache lines of what will be read soon.
+    fn prefetch<T>(it: &T);
 }
+
+/// By set, the lanes in it, moved to the front, a byte each.
+static COMPRESSED: [[u8; LANES]; 1 << LANES] = {
+    let mut table = [[0; LANES]; 1 << LANES];
+    let mut set = 0;
+    while set < 1 << LANES {
+        let (mut lane, mut n) = (0, 0);
+        while lane < LANES {
+            if set >> lane & 1 == 1 {
+                table[set][n] = lane as u8;
+                n += 1;
+            }
+            lane += 1;
+        }
+        set += 1;
+    }
+    table
+};
 
 /// Work that is written over [`Simd`].
 pub(super) trait Job {

@@ -42,6 +42,10 @@ impl Simd for Portable {
         zip(a, b, |a, b| a * b)
     }
     #[inline(always)]
+    fn div(a: Lanes, b: Lanes) -> Lanes {
+        zip(a, b, |a, b| a / b)
+    }
+    #[inline(always)]
     fn mul_add(a: Lanes, b: Lanes, c: Lanes) -> Lanes {
         Self::add(Self::mul(a, b), c)
     }
@@ -69,4 +73,47 @@ impl Simd for Portable {
         }
         bits
     }
+    #[inline(always)]
+    fn le_bits(a: Lanes, b: Lanes) -> Lanes {
+        zip(a, b, |a, b| f32::from_bits(if a <= b { u32::MAX } else { 0 }))
+    }
+    #[inline(always)]
+    fn and(a: Lanes, b: Lanes) -> Lanes {
+        zip(a, b, |a, b| f32::from_bits(a.to_bits() & b.to_bits()))
+    }
+    #[inline(always)]
+    fn or(a: Lanes, b: Lanes) -> Lanes {
+        zip(a, b, |a, b| f32::from_bits(a.to_bits() | b.to_bits()))
+    }
+    #[inline(always)]
+    fn select(bits: Lanes, a: Lanes, b: Lanes) -> Lanes {
+        let mut out = b;
+        for i in 0..LANES {
+            out.0[i] = if bits.0[i].to_bits() != 0 { a.0[i] } else { b.0[i] };
+        }
+        out
+    }
+    #[inline(always)]
+    fn bits(a: Lanes) -> u32 {
+        let mut bits = 0;
+        for i in 0..LANES {
+            bits |= (a.0[i].to_bits() >> 31) << i;
+        }
+        bits
+    }
+    #[inline(always)]
+    fn least(a: Lanes) -> f32 {
+        a.0.iter().fold(f32::INFINITY, |least, &x| if x < least { x } else { least })
+    }
+    #[inline(always)]
+    fn compress(a: Lanes, set: u32) -> Lanes {
+        let order = &super::COMPRESSED[set as usize % (1 << LANES)];
+        let mut out = a;
+        for (to, &from) in out.0.iter_mut().zip(order) {
+            *to = a.0[from as usize % LANES];
+        }
+        out
+    }
+    #[inline(always)]
+    fn prefetch<T>(_: &T) {}
 }
