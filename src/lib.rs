@@ -17,6 +17,7 @@ pub mod lights;
 pub mod materials;
 pub mod math;
 pub mod render;
+pub mod report;
 pub mod sampler;
 pub mod sampling;
 pub mod scene;

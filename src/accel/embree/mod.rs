@@ -10,6 +10,7 @@ mod batch;
 mod callbacks;
 mod handles;
 mod level;
+pub mod library;
 mod plan;
 mod query;
 #[cfg(test)]
