@@ -27,6 +27,9 @@ pub enum Error {
         /// What the operating system says.
         reason: String,
     },
+    /// A comparison, check or crosscheck came to an end and failed. Exit code 1.
+    #[error("{0}")]
+    Failed(String),
     /// A fault of ours or of a library below us. Exit code 4.
     #[error("internal failure: {0}")]
     Internal(String),
@@ -85,6 +88,7 @@ impl Error {
     /// The process exit code that this error means (README, "Exit codes").
     pub fn exit_code(&self) -> u8 {
         match self {
+            Error::Failed(_) => 1,
             Error::Usage(_) | Error::Content { .. } => 2,
             Error::File { .. } => 3,
             Error::Internal(_) => 4,

@@ -6,6 +6,7 @@ extern crate self as skylit;
 
 pub mod accel;
 pub mod base;
+pub mod bench;
 pub mod cameras;
 pub mod cli;
 pub mod color;

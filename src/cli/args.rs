@@ -79,6 +79,24 @@ pub fn duration(s: &str) -> Result<Duration, String> {
     }
 }
 
+/// A count within `range`: `871414`, `300k`, `1.5M`, `20M`, `1G`.
+pub fn amount(s: &str, range: std::ops::RangeInclusive<u64>) -> Result<u64, String> {
+    let digits = s.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let unit = match &s[digits.len()..] {
+        "" => 1.0,
+        "k" | "K" => 1e3,
+        "M" => 1e6,
+        "G" => 1e9,
+        unit => return Err(format!("unknown unit \"{unit}\": k, M or G")),
+    };
+    let read = digits.parse::<f64>().ok().map(|v| (v * unit).round());
+    match read {
+        // Whole numbers of this size are exact.
+        Some(v) if v >= *range.start() as f64 && v <= *range.end() as f64 => Ok(v as u64),
+        _ => Err(format!("takes a count from {} to {}, such as 300k or 1M", range.start(), range.end())),
+    }
+}
+
 /// `N` numbers between commas.
 fn numbers<const N: usize>(s: &str, form: &str) -> Result<[f64; N], String> {
     let read = s.split(',').map(|t| t.trim().parse().ok().filter(|v: &f64| v.is_finite()));
@@ -168,6 +186,13 @@ mod tests {
         assert_eq!(duration("1.5h"), Ok(Duration::from_secs(5400)));
         assert_eq!(duration("500ms"), Ok(Duration::from_millis(500)));
         assert!(["", "s", "0s", "-3s", "3d", "nans", "1e400", "inf"].iter().all(|s| duration(s).is_err()));
+        assert_eq!(
+            [amount("300k", 1..=9_000_000), amount("1.5M", 1..=9_000_000)],
+            [Ok(300_000), Ok(1_500_000)]
+        );
+        assert!(
+            ["", "M", "0", "1T", "-1", "nan", "1G", "1e99"].iter().all(|s| amount(s, 1..=9_000_000).is_err())
+        );
         assert_eq!("0,0.5,0, 1".parse(), Ok(CropWindow([0.0, 0.5, 0.0, 1.0])));
         assert!(["0,1", "a,b,c,d", "0,1,0,nan"].iter().all(|s| s.parse::<CropWindow>().is_err()));
         assert_eq!("-30,15".parse(), Ok(ViewAngles { azimuth_deg: -30.0, elevation_deg: 15.0 }));

@@ -1,6 +1,7 @@
 //! L5: the command line, one file a verb. Results go to stdout, progress and logs to stderr.
 
 mod args;
+mod bench;
 mod info;
 mod interrupt;
 mod list;
@@ -14,8 +15,9 @@ mod summary;
 
 use crate::error::{Error, Result};
 use args::Threads;
+use clap::builder::ArgPredicate;
 use clap::error::ErrorKind;
-use clap::{ArgAction, Args, CommandFactory, Parser, Subcommand};
+use clap::{ArgAction, Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use log::LevelFilter;
 use std::io::{ErrorKind as IoErrorKind, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -66,6 +68,8 @@ enum Verb {
     Render(Box<render::RenderArgs>),
     /// Say what is in a scene or a mesh, what it needs and what it will cost
     Info(Box<info::InfoArgs>),
+    /// Measure: how fast every kernel answers the same rays
+    Bench(Box<bench::BenchArgs>),
     /// List every registered kind with its parameters
     List(list::ListArgs),
     /// Print the completions of a shell
@@ -97,7 +101,8 @@ impl From<Error> for Failure {
 }
 
 fn run() -> Result<(), Failure> {
-    let cli = Cli::try_parse().map_err(Failure::Clap)?;
+    let words = command().try_get_matches();
+    let cli = words.and_then(|w| Cli::from_arg_matches(&w)).map_err(Failure::Clap)?;
     start_log(&cli.common);
     interrupt::listen();
     let threads = cli.common.threads.unwrap_or(Threads::Max).count();
@@ -107,6 +112,7 @@ fn run() -> Result<(), Failure> {
     match &cli.verb {
         Verb::Render(args) => render::run(args, &setting)?,
         Verb::Info(args) => info::run(args, &setting)?,
+        Verb::Bench(args) => bench::run(args, &setting)?,
         Verb::List(args) => list::run(args)?,
         Verb::Completions(args) => manual::completions(args)?,
         Verb::Man(args) => manual::man(args)?,
@@ -195,7 +201,12 @@ fn panic_message() -> String {
     PANIC.lock().ok().and_then(|mut m| m.take()).unwrap_or_else(|| "panic".into())
 }
 
-/// The whole command, for completions and the manual.
+/// The whole command.
 fn command() -> clap::Command {
-    Cli::command()
+    // Where sizes are given, what is generated need not be.
+    let input = |a: clap::Arg| {
+        let generated = a.required(false).required_unless_present("triangles");
+        generated.default_value_if("triangles", ArgPredicate::IsPresent, "knot")
+    };
+    Cli::command().mut_subcommand("bench", |b| b.mut_subcommand("rays", |r| r.mut_arg("input", input)))
 }

@@ -15,7 +15,7 @@ use std::mem::MaybeUninit;
 use std::ops::Range;
 
 /// Rays that Embree is given at once: its streams sort that many, and 4 columns of scratch fit on the stack.
-const CHUNK: usize = 1024;
+pub(super) const CHUNK: usize = 1024;
 
 /// Numbers of the rays of a chunk, for callbacks.
 static IDS: [u32; CHUNK] = {
@@ -30,7 +30,7 @@ static IDS: [u32; CHUNK] = {
 
 /// The columns of a chunk of a batch.
 #[derive(Clone, Copy)]
-struct Columns<'a> {
+pub(super) struct Columns<'a> {
     o: [&'a [f32]; 3],
     d: [&'a [f32]; 3],
     tnear: &'a [f32],
@@ -39,7 +39,7 @@ struct Columns<'a> {
 
 impl<'a> Columns<'a> {
     /// Panics if the batch's columns are not of one length.
-    fn new(rays: &'a RayBatch, range: Range<usize>) -> Self {
+    pub(super) fn new(rays: &'a RayBatch, range: Range<usize>) -> Self {
         let cut = |c: &'a Vec<f32>| &c[range.clone()];
         Columns {
             o: [cut(&rays.ox), cut(&rays.oy), cut(&rays.oz)],
@@ -49,12 +49,12 @@ impl<'a> Columns<'a> {
         }
     }
 
-    fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.tnear.len()
     }
 
     /// For Embree, with the ends of the rays in `tfar` (which it overwrites), of the same length.
-    fn embree(&self, level: &Level, tfar: &mut [f32]) -> EmRays {
+    pub(super) fn embree(&self, level: &Level, tfar: &mut [f32]) -> EmRays {
         assert!(self.len() <= CHUNK && tfar.len() == self.len());
         let [org_x, org_y, org_z] = self.o.map(<[f32]>::as_ptr);
         let [dir_x, dir_y, dir_z] = self.d.map(<[f32]>::as_ptr);
@@ -107,6 +107,11 @@ impl simd::Kernel for AllTame<'_> {
         }
         bad == 0
     }
+}
+
+/// Whether Embree may be given all rays of these columns as they are.
+pub(super) fn tame(columns: Columns, reach: f32) -> bool {
+    simd::dispatch(AllTame { columns, reach })
 }
 
 /// Copies of a chunk's columns in which the rays that Embree cannot be given are off.
@@ -189,7 +194,7 @@ impl Kernel {
         for first in (0..n).step_by(CHUNK) {
             let range = first..n.min(first + CHUNK);
             let columns = Columns::new(rays, range.clone());
-            if simd::dispatch(AllTame { columns, reach }) {
+            if tame(columns, reach) {
                 work(&columns, range, &[]);
             } else {
                 let patched = Patched::new(&columns, reach);

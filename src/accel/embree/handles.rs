@@ -1,6 +1,7 @@
 //! Owners of Embree's objects, which are reference-counted, and what a device reports: errors and memory.
 
 use crate::error::{Error, Result};
+use crate::math::simd::Level;
 use embree_sys::*;
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::ptr;
@@ -26,9 +27,18 @@ unsafe impl Send for Device {}
 unsafe impl Sync for Device {}
 
 impl Device {
-    /// A device that builds with so many threads; 0 means all.
-    pub(super) fn new(threads: usize) -> Result<Self> {
-        let config = if threads == 0 { String::new() } else { format!("threads={threads}") };
+    /// A device that builds with so many threads (0 means all) and uses no more than an instruction set.
+    pub(super) fn new(threads: usize, simd: Option<Level>) -> Result<Self> {
+        let threads = if threads == 0 { String::new() } else { format!("threads={threads}") };
+        let isa = match simd {
+            None => "",
+            Some(Level::Portable) => ",isa=sse2",
+            Some(Level::Sse42) => ",isa=sse4.2",
+            Some(Level::Avx2) => ",isa=avx2",
+            Some(Level::Avx512) => ",isa=avx512",
+        };
+        let config = format!("{threads}{isa}");
+        let config = config.trim_start_matches(',');
         let config = CString::new(config).map_err(|e| Error::Internal(e.to_string()))?;
         // SAFETY: a C string that outlives the call; errors before a device exists are asked for with null.
         let (raw, error) = unsafe { (rtcNewDevice(config.as_ptr()), rtcGetDeviceError(ptr::null_mut())) };

@@ -25,7 +25,7 @@ pub fn loaded() -> Result<Library> {
     if let Some(known) = LIBRARY.get() {
         return Ok(known.clone());
     }
-    let version = Device::new(0)?.version();
+    let version = Device::new(0, None)?.version();
     let path = mapped_file();
     let assertions = path.as_deref().and_then(calls_assert);
     Ok(LIBRARY.get_or_init(|| Library { version, path, assertions }).clone())

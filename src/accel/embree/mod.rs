@@ -8,6 +8,7 @@
 
 mod batch;
 mod callbacks;
+pub mod forms;
 mod handles;
 mod level;
 pub mod library;
@@ -26,6 +27,7 @@ use crate::base::ray::{Coherence, Ray, RayBatch};
 use crate::base::shape::LocalRay;
 use crate::error::Result;
 use crate::math::aabb::Aabb;
+use crate::math::simd;
 use handles::Device;
 use level::{Builder, Level, Levels};
 use query::Entry;
@@ -45,6 +47,7 @@ pub struct Kernel {
     failure: Arc<Failure>,
     device: Device,
     mode: KernelMode,
+    simd: Option<simd::Level>,
     geometry: Arc<Geometry>,
 }
 
@@ -58,10 +61,10 @@ impl Kernel {
     /// With a limit on the instances that flattening may add.
     fn with_budget(geometry: Arc<Geometry>, options: &KernelOptions, budget: usize) -> Result<Self> {
         check_extent(&geometry)?;
-        let device = Device::new(options.threads)?;
+        let device = Device::new(options.threads, options.simd)?;
         let failure = Arc::new(Failure::default());
         let levels = Builder::new(&geometry, &device, &failure, options).build(budget)?;
-        Ok(Kernel { levels, failure, device, mode: options.mode, geometry })
+        Ok(Kernel { levels, failure, device, mode: options.mode, simd: options.simd, geometry })
     }
 
     fn root(&self) -> &Level {
@@ -112,7 +115,8 @@ impl Intersectable for Kernel {
             KernelMode::Robust => "robust",
             KernelMode::Fast => "fast",
         };
-        format!("embree {} {mode}", self.device.version())
+        let limit = self.simd.map_or(String::new(), |l| format!(" at most {}", l.name()));
+        format!("embree {} {mode}{limit}", self.device.version())
     }
 
     fn take_failure(&self) -> Result<()> {
