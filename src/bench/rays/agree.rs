@@ -9,8 +9,8 @@ use crate::base::ray::{Ray, RayBatch};
 use crate::scene::Scene;
 use rayon::prelude::*;
 
-/// Tests of a primitive that the oracle may take for a workload: some seconds.
-const ORACLE_TESTS: u64 = 300_000_000;
+/// Tests of a primitive that the oracle may take for a workload: about a second.
+const ORACLE_TESTS: u64 = 100_000_000;
 /// Rays that it is asked at least, where their tests are not [`ORACLE_LIMIT`] times too many.
 const ORACLE_LEAST: u64 = 16;
 /// Most rays that it is asked.
@@ -50,7 +50,7 @@ pub struct Oracle {
 }
 
 impl Oracle {
-    /// Asks it for as many rays as some seconds allow: none for scenes that are too large.
+    /// Asks it for as many rays as about a second allows: none for scenes that are too large.
     pub fn ask(scene: &Scene, batches: &[RayBatch], work: &Workload) -> Oracle {
         let primitives = placed_primitives(&scene.geometry).max(1);
         let wanted = match primitives {

@@ -6,6 +6,7 @@ use crate::report::bars::{Bar, BarGroup, Bars};
 use crate::report::lines::{Axis, Line, Lines};
 use crate::report::table::{Cell, Column, Table, Tone};
 use crate::report::{Details, Report, Section, Verdict};
+use std::path::Path;
 
 /// Kernels: what their builds took.
 pub fn kernels_table(r: &Record) -> Table {
@@ -204,19 +205,21 @@ fn quoted(text: &str) -> String {
 
 /// The page of a measurement.
 pub fn page(r: &Record, comparison: Option<&Comparison>) -> Report {
-    let mut report = Report::new(format!("Rays through {}", r.scene.input)).subtitle(heading(r));
+    let name = Path::new(&r.scene.input).file_name().map_or("a scene".into(), |n| n.to_string_lossy());
+    let mut report = Report::new(format!("Rays through {name}")).subtitle(heading(r));
     report = report.verdict(comparison.map_or_else(|| agreement_verdict(r), verdict));
     if let Some(c) = comparison {
         report = report.section(baseline_section(c));
     }
-    let speed = Section::new("Speed")
-        .prose(
+    let mut speed = Section::new("Speed").prose(
             "Each bar is the median of the rounds, its whisker runs from the slowest to the fastest. Rows ran in turn, \
              forwards and backwards, over exactly the same rays, which lay as each form wants them before the clock \
              started.",
-        )
-        .with(bars(r))
-        .with(speed_table(r));
+        );
+    for chart in (0..r.workloads.len()).filter_map(|w| bars(r, w)) {
+        speed = speed.with(chart);
+    }
+    speed = speed.with(speed_table(r));
     let agreement = Section::new("Agreement")
         .prose(
             "Answers that differ from the reference row's: where one says hit and the other miss, plus where both name \
@@ -309,26 +312,27 @@ fn baseline_section(c: &Comparison) -> Section {
     section
 }
 
-fn bars(r: &Record) -> Bars {
-    let group = |(i, w): (usize, &super::record::WorkloadInfo)| {
-        let bar = |row: &Row| {
-            let c = row.cells[i].as_ref()?;
-            Some(Bar {
-                label: format!("{}, {}", r.kernel_label(row.kernel), row.form),
-                value: c.mrays,
-                text: digits(c.mrays),
-                spread: Some([c.min, c.max]),
-                series: row.kernel,
-            })
-        };
-        BarGroup { label: w.name.clone(), bars: r.rows.iter().filter_map(bar).collect() }
+/// A chart for one workload; none where there are no rays.
+fn bars(r: &Record, workload: usize) -> Option<Bars> {
+    let info = &r.workloads[workload];
+    let bar = |row: &Row| {
+        let c = row.cells[workload].as_ref()?;
+        Some(Bar {
+            label: format!("{}, {}", r.kernel_label(row.kernel), row.form),
+            value: c.mrays,
+            text: digits(c.mrays),
+            spread: Some([c.min, c.max]),
+            series: row.kernel,
+        })
     };
-    let groups = r.workloads.iter().enumerate().map(group).filter(|g| !g.bars.is_empty());
-    Bars {
-        caption: "Mrays/s".into(),
+    let bars: Vec<Bar> = r.rows.iter().filter_map(bar).collect();
+    let group = BarGroup { label: String::new(), bars };
+    let chart = Bars {
+        caption: format!("{}, Mrays/s: {}", info.name, info.doc),
         series: (0..r.kernels.len()).map(|k| r.kernel_label(k)).collect(),
-        groups: groups.collect(),
-    }
+        groups: vec![group],
+    };
+    (!chart.groups[0].bars.is_empty()).then_some(chart)
 }
 
 /// Build time, memory and speed by size, for a terminal.

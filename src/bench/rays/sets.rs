@@ -2,7 +2,7 @@
 
 use crate::accel;
 use crate::base::geometry::Geometry;
-use crate::base::hit::HitBatch;
+use crate::base::hit::{Hit, HitBatch};
 use crate::base::intersectable::QueryKind;
 use crate::base::ray::{Coherence, Ray, RayBatch};
 use crate::base::vertex::Vertex;
@@ -218,14 +218,13 @@ fn camera_rays(scene: &Scene, count: usize) -> Vec<RayBatch> {
     let settings = RenderSettings { spp, threads: 1, seed: SEED, ..RenderSettings::new(size) };
     let tiles: Vec<_> = Film::new(size[0], size[1], settings.crop).tiles().collect();
     let wanted = count.div_ceil(16 * 16 * spp as usize).clamp(1, tiles.len());
-    let chosen = (0..wanted).map(|i| tiles[i * tiles.len() / wanted]);
+    let chosen: Vec<_> = spread(tiles.len(), wanted).into_iter().map(|i| tiles[i]).collect();
     let of_tile = |rect| {
         let keep = Keep(Mutex::default());
         let job = Job { scene, integrator: &keep, settings: &settings };
         Worker::new(&settings).render_tile(&job, rect, 0..spp);
         keep.0.into_inner().unwrap_or_else(|e| e.into_inner())
     };
-    let chosen: Vec<_> = chosen.collect();
     let made: Vec<Vec<RayBatch>> = chosen.into_par_iter().map(of_tile).collect();
     let mut out = Vec::new();
     let mut left = count;
@@ -239,16 +238,30 @@ fn camera_rays(scene: &Scene, count: usize) -> Vec<RayBatch> {
     out
 }
 
+/// So many numbers below `n`, ascending, spread evenly without a period that tiles of a row could fall in with.
+fn spread(n: usize, wanted: usize) -> Vec<usize> {
+    if 3 * wanted > n {
+        return (0..wanted).map(|i| i * n / wanted).collect();
+    }
+    // Multiples of the golden ratio keep at least 0.38 / wanted apart: no number comes twice.
+    const RATIO: f64 = 0.618_033_988_749_894_9;
+    let place = |i: usize| ((i as f64 + 0.5) * RATIO).fract();
+    let mut all: Vec<usize> = (0..wanted).map(|i| (place(i) * n as f64) as usize).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
 /// Surface points, as rays that met them.
-struct Points<'a> {
+pub(super) struct Points<'a> {
     scene: &'a Scene,
-    /// Batch and place in it of each ray that met something.
-    hits: Vec<(Ray, crate::base::hit::Hit)>,
+    /// Each ray that met something, with its hit.
+    hits: Vec<(Ray, Hit)>,
     spread: f32,
 }
 
 impl<'a> Points<'a> {
-    fn new(scene: &'a Scene, rays: &[RayBatch]) -> Self {
+    pub(super) fn new(scene: &'a Scene, rays: &[RayBatch]) -> Self {
         let of_batch = |batch: &RayBatch| {
             let mut hits = HitBatch::default();
             scene.kernel.intersect_batch(batch, &mut hits, Coherence::Incoherent);
@@ -264,14 +277,14 @@ impl<'a> Points<'a> {
     }
 
     /// Point `i`; after the last comes the first again.
-    fn vertex(&self, i: usize) -> Vertex {
+    pub(super) fn vertex(&self, i: usize) -> Vertex {
         let (ray, hit) = self.hits[i % self.hits.len()];
         self.scene.vertex(&ray, hit, self.spread)
     }
 }
 
 /// Candidates that are tried for each ray wanted: points that no light reaches give no shadow ray.
-const TRIES: usize = 4;
+const TRIES: usize = 16;
 
 /// The first `count` rays that candidates 0, 1, ... come to, in batches.
 fn from_candidates(count: usize, ray: impl Fn(usize) -> Option<Ray> + Sync) -> Vec<RayBatch> {
@@ -307,11 +320,11 @@ fn key(kind: RayKind, i: u32) -> u32 {
 }
 
 /// The geometric normal of the side that is seen.
-fn seen_side(v: &Vertex) -> Vec3 {
+pub(super) fn seen_side(v: &Vertex) -> Vec3 {
     if v.wo.dot(v.ng) >= 0.0 { v.ng } else { -v.ng }
 }
 
-fn bounce(v: &Vertex, _: &Scene, i: u32) -> Option<Ray> {
+pub(super) fn bounce(v: &Vertex, _: &Scene, i: u32) -> Option<Ray> {
     let kind = RayKind::Bounce;
     let local = cosine_hemisphere(Vec2::from(random(kind, i, 0)));
     let n = seen_side(v);
@@ -320,7 +333,7 @@ fn bounce(v: &Vertex, _: &Scene, i: u32) -> Option<Ray> {
     (w.dot(n) > 0.0).then(|| v.spawn(w, key(kind, i)))
 }
 
-fn shadow(v: &Vertex, scene: &Scene, i: u32) -> Option<Ray> {
+pub(super) fn shadow(v: &Vertex, scene: &Scene, i: u32) -> Option<Ray> {
     let kind = RayKind::Shadow;
     let lights = &scene.lights;
     let u = random(kind, i, 1)[0];
@@ -333,7 +346,7 @@ fn shadow(v: &Vertex, scene: &Scene, i: u32) -> Option<Ray> {
 /// Above the tangent plane, at most: degrees.
 const GRAZING_DEG: f32 = 1.0;
 
-fn grazing(v: &Vertex, _: &Scene, i: u32) -> Option<Ray> {
+pub(super) fn grazing(v: &Vertex, _: &Scene, i: u32) -> Option<Ray> {
     let kind = RayKind::Grazing;
     let [u, turn] = random(kind, i, 0);
     let (sin, cos) = (u * GRAZING_DEG).to_radians().sin_cos();

@@ -1,6 +1,7 @@
 //! The whole binary: exit codes, messages, and that nothing is left half-written.
 
 mod bad_input;
+mod bench;
 mod folder;
 
 use folder::{Folder, QUICK};
@@ -15,7 +16,7 @@ fn usage_is_told_on_the_right_stream() {
     assert!(bare.stderr.contains("Usage: skylit"));
     let help = f.run("--help");
     assert_eq!((help.code, help.stderr.as_str()), (0, ""));
-    for verb in ["render", "info", "list", "completions", "man"] {
+    for verb in ["render", "info", "bench", "list", "completions", "man"] {
         assert!(help.stdout.contains(verb));
         assert!(f.run(&format!("{verb} --help")).succeeds().stdout.contains("--threads"));
     }
