@@ -109,6 +109,7 @@ pub struct KernelOptions {
     pub mode: KernelMode,
     /// Threads for the build; 0 means all.
     pub threads: usize,
-    /// The instruction set of hand-written kernels; none means [`Level::chosen`]. Changes no answer.
+    /// The instruction set of hand-written kernels; none means [`Level::chosen`]. Changes no answer of these. Kernels of
+    /// a library take it as a limit, if they can, and then say so in [`Intersectable::describe`].
     pub simd: Option<Level>,
 }

@@ -76,7 +76,8 @@ pub fn grow(growth: &Growth, progress: &dyn Progress) -> Result<Vec<Record>> {
     sizes.dedup();
     let one = |&size: &u64| {
         progress.step(&format!("make {} of {size} triangles", growth.shape));
-        let options = BuildOptions::default();
+        let mut options = BuildOptions::default();
+        options.kernel.threads = growth.threads;
         let mut scene = build(scene_of(&growth.shape, size)?, &options)?;
         check_scene(&scene)?;
         let sets = RaySets::generate(&scene, growth.count)?;

@@ -29,6 +29,9 @@ pub const SEED: u64 = 20_260_101;
 /// Samples a pixel that camera rays have, so that a batch is a tile of 16 x 16 pixels.
 const SPP: u32 = 8;
 
+/// Tiles that camera rays come from at least, where the picture has as many.
+const TILES: usize = 64;
+
 /// Where rays come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RayKind {
@@ -210,14 +213,17 @@ impl Integrator for Keep {
 }
 
 /// The rays of tiles that are spread evenly over the picture, as [`crate::render`] makes them.
-fn camera_rays(scene: &Scene, count: usize) -> Vec<RayBatch> {
+pub(super) fn camera_rays(scene: &Scene, count: usize) -> Vec<RayBatch> {
     let size = [scene.film.width, scene.film.height];
     let pixels = size[0] as usize * size[1] as usize;
     // A small picture has more samples a pixel instead.
     let spp = count.div_ceil(pixels).next_multiple_of(2).max(SPP as usize) as u32;
     let settings = RenderSettings { spp, threads: 1, seed: SEED, ..RenderSettings::new(size) };
     let tiles: Vec<_> = Film::new(size[0], size[1], settings.crop).tiles().collect();
-    let wanted = count.div_ceil(16 * 16 * spp as usize).clamp(1, tiles.len());
+    let of_whole_tiles = count.div_ceil(16 * 16 * spp as usize);
+    // Few rays are parts of more tiles: a handful of whole ones could all miss.
+    let wanted = of_whole_tiles.max(TILES).min(tiles.len());
+    let most = if of_whole_tiles < wanted { count.div_ceil(wanted) } else { usize::MAX };
     let chosen: Vec<_> = spread(tiles.len(), wanted).into_iter().map(|i| tiles[i]).collect();
     let of_tile = |rect| {
         let keep = Keep(Mutex::default());
@@ -226,15 +232,22 @@ fn camera_rays(scene: &Scene, count: usize) -> Vec<RayBatch> {
         keep.0.into_inner().unwrap_or_else(|e| e.into_inner())
     };
     let made: Vec<Vec<RayBatch>> = chosen.into_par_iter().map(of_tile).collect();
-    let mut out = Vec::new();
+    let mut out: Vec<RayBatch> = Vec::new();
     let mut left = count;
-    for mut batch in made.into_iter().flatten() {
-        batch.resize(batch.len().min(left));
-        left -= batch.len();
-        if !batch.is_empty() {
-            out.push(batch);
+    for tile in made {
+        let mut room = most.min(left);
+        for mut batch in tile {
+            batch.resize(batch.len().min(room));
+            (room, left) = (room - batch.len(), left - batch.len());
+            match out.last_mut() {
+                Some(last) if most < usize::MAX && last.len() + batch.len() <= BATCH => {
+                    (0..batch.len()).for_each(|i| last.push(&batch.get(i)));
+                }
+                _ => out.push(batch),
+            }
         }
     }
+    out.retain(|b| !b.is_empty());
     out
 }
 

@@ -9,7 +9,9 @@ use super::measure::{Bench, Setup, Silent, measure};
 use super::peer::serve;
 use super::present;
 use super::record::{Cell, Differences, KIND, Record, Row, SceneInfo, VERSION, WorkloadInfo, median};
-use super::sets::{BATCH, Points, RayKind, RaySets, WORKLOADS, bounce, count, grazing, seen_side, shadow};
+use super::sets::{
+    BATCH, Points, RayKind, RaySets, WORKLOADS, bounce, camera_rays, count, grazing, seen_side, shadow,
+};
 use super::verdict::{Judgement, compare};
 use crate::base::intersectable::{BuildQuality, KernelMode};
 use crate::base::ray::{Coherence, Ray, RayBatch};
@@ -62,8 +64,9 @@ fn sets_depend_on_the_scene_alone() {
 
 #[test]
 fn camera_rays_come_in_tiles() {
-    let sets = sets(&scene());
-    let first = &sets.of(RayKind::Camera)[0];
+    let all = camera_rays(&scene(), 80 * BATCH);
+    assert_eq!(count(&all), 80 * BATCH);
+    let first = &all[0];
     assert_eq!(first.len(), BATCH);
     let mean: Vec3 = (0..BATCH).map(|i| first.direction(i)).sum::<Vec3>().normalize();
     // 16 pixels of 1280 over an angle of view of some 60 degrees: less than a degree, and two with the filter's reach.
