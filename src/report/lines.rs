@@ -122,12 +122,15 @@ impl Scale {
             for decade in (first..=last).filter(|d| d % every == 0) {
                 all.extend(steps.iter().map(|s| s * 10f64.powi(decade)));
             }
-        } else {
+        }
+        let inside = |v: &f64| (self.from..=self.to).contains(v);
+        all.retain(inside);
+        // Less than a factor of five or so is marked in equal steps on either axis.
+        if all.len() < 3 {
             let step = nice_step((self.to - self.from) / 6.0);
             let first = (self.from / step).ceil() as i64;
-            all.extend((first..first + 20).map(|i| i as f64 * step));
+            all = (first..first + 20).map(|i| i as f64 * step).filter(inside).collect();
         }
-        all.retain(|v| (self.from..=self.to).contains(v));
         all.into_iter().map(|v| Tick { at: self.at(v), text: short(v) }).collect()
     }
 }

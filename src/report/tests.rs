@@ -121,6 +121,20 @@ fn bars_are_as_long_as_their_values() {
 }
 
 #[test]
+fn axes_have_marks_however_short_they_are() {
+    for log in [false, true] {
+        for ends in [[66.8, 70.3], [1.0, 3.0], [1e3, 9e8], [5.0, 5.0]] {
+            let points = ends.map(|v| [v, v]).to_vec();
+            let axis = || Axis { label: String::new(), log };
+            let series = vec![Line { name: String::new(), points }];
+            let lines = Lines { caption: String::new(), x: axis(), y: axis(), series };
+            let html = Report::new("").section(Section::new("").with(lines)).to_html().unwrap();
+            assert!(html.matches("text-anchor=\"end\"").count() >= 3, "{ends:?}, log: {log}");
+        }
+    }
+}
+
+#[test]
 fn numbers_on_axes_are_short() {
     let all = [0.0, 0.02, 1.0, 1500.0, 2e7, 3e9, 1e-5, 5e13];
     assert_eq!(all.map(short), ["0", "0.02", "1", "1.5k", "20M", "3G", "1e-5", "5e13"]);

@@ -140,6 +140,10 @@ struct Room {
 
 impl CallForm {
     /// Whether a kernel can be asked for a workload in this form, so that it differs from all other forms.
+    #[cfg_attr(
+        not(feature = "embree"),
+        expect(unused_variables, reason = "the forms left are every kernel's")
+    )]
     pub fn fits(&self, kernel: &Built, work: &Workload) -> bool {
         match self.how {
             How::Single | How::Batch { hint: true } => true,

@@ -365,16 +365,18 @@ fn slower_beyond_noise_is_what_counts() {
 
 #[test]
 fn records_that_cannot_be_compared_are_refused() {
-    let (a, mut b) = (made_up(&[1.0]), made_up(&[1.0]));
+    let (a, mut b) = (made_up(&[1.0; 5]), made_up(&[1.0; 5]));
     b.scene.triangles = 2;
     assert!(compare(&a, &b).unwrap_err().to_string().contains("another scene"));
-    let mut c = made_up(&[1.0]);
+    let mut c = made_up(&[1.0; 5]);
     c.rows[0].form = "batch".into();
     assert!(compare(&a, &c).unwrap_err().to_string().contains("no row in common"));
-    let mut d = made_up(&[1.0]);
+    let mut d = made_up(&[1.0; 5]);
     d.threads = 7;
     let caveats = compare(&a, &d).unwrap().caveats;
     assert_eq!(caveats, ["threads: 1 then, 7 now"]);
+    let hasty = compare(&a, &made_up(&[1.0; 2])).unwrap().caveats;
+    assert!(hasty.len() == 1 && hasty[0].contains("2 rounds"), "{hasty:?}");
 }
 
 #[test]

@@ -10,6 +10,9 @@ const SPREADS: f64 = 3.0;
 /// shares its caches drifts by as much.
 const LEAST: f64 = 0.05;
 
+/// Of fewer rounds the spread is itself mostly noise.
+const FEW: usize = 5;
+
 /// A row's figures for one workload, then and now.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Change {
@@ -103,7 +106,12 @@ fn caveats(old: &Record, new: &Record) -> Vec<String> {
         ("rays", old.rays.clone(), new.rays.clone()),
     ];
     let differ = facts.into_iter().filter(|(_, a, b)| a != b);
-    differ.map(|(what, a, b)| format!("{what}: {a} then, {b} now")).collect()
+    let mut all: Vec<String> = differ.map(|(what, a, b)| format!("{what}: {a} then, {b} now")).collect();
+    let rounds = old.rounds.min(new.rounds);
+    if rounds < FEW {
+        all.push(format!("{rounds} rounds hardly tell what noise is: --rounds {FEW} or more do"));
+    }
+    all
 }
 
 impl Comparison {
