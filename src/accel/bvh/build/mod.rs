@@ -12,7 +12,7 @@ use crate::base::intersectable::{BuildQuality, KernelMode, KernelOptions};
 use crate::error::{Error, Result};
 use crate::math::aabb::Aabb;
 use rayon::prelude::*;
-use refs::{Kind, MAX_LEAVES, Ref};
+use refs::{Kind, MAX_NUMBER, Ref};
 use split::{Set, Units};
 use wide::{Plan, build_top};
 
@@ -23,8 +23,8 @@ pub(super) fn build(geometry: &Geometry, options: &KernelOptions) -> Result<Vec<
 }
 
 fn tree(geometry: &Geometry, group: &Group, options: &KernelOptions) -> Result<Tree> {
-    if group.leaves.len().max(group.children.len()) > MAX_LEAVES {
-        return Err(Error::Usage(format!("a group holds more than {MAX_LEAVES} objects")));
+    if group.leaves.len().max(group.children.len()) > MAX_NUMBER {
+        return Err(Error::Usage(format!("a group holds more than {MAX_NUMBER} objects")));
     }
     let mut refs = references(geometry, group)?;
     let meshes: Vec<usize> = (0..group.leaves.len()).filter(|&i| is_mesh(group, i)).collect();
@@ -41,7 +41,7 @@ fn tree(geometry: &Geometry, group: &Group, options: &KernelOptions) -> Result<T
             BuildQuality::Balanced => 16,
             BuildQuality::Best => 32,
         },
-        units: Units(if meshes.is_empty() { 1 } else { LANES }),
+        units: Units::new(if meshes.is_empty() { 1 } else { LANES }),
         owners: meshes.len() > 1,
         shapes_per_leaf: 2,
     };
@@ -69,15 +69,23 @@ fn references(geometry: &Geometry, group: &Group) -> Result<Vec<Ref>> {
         let i = i as u32;
         match leaf.shape.triangles() {
             Some(mesh) => {
-                let count = u32::try_from(mesh.indices.len());
-                let count =
-                    count.map_err(|_| Error::Usage("a mesh of more than 2^32 triangles".to_owned()))?;
+                let count = mesh.indices.len();
+                if count > MAX_NUMBER {
+                    return Err(Error::Usage(format!(
+                        "a mesh of {count} triangles; this kernel holds {MAX_NUMBER}"
+                    )));
+                }
                 let one = |t: u32| Ref::new(&Aabb::from_points(mesh.corners(t)), Kind::Triangle(i, t));
-                refs.par_extend((0..count).into_par_iter().map(one));
+                refs.par_extend((0..count as u32).into_par_iter().map(one));
             }
             None => {
+                let count = leaf.shape.primitive_count();
+                if count as usize > MAX_NUMBER {
+                    let message = format!("a shape of {count} primitives; this kernel holds {MAX_NUMBER}");
+                    return Err(Error::Usage(message));
+                }
                 let one = |p: u32| Ref::new(&leaf.shape.primitive_bounds(p), Kind::Shape(i, p));
-                refs.par_extend((0..leaf.shape.primitive_count()).into_par_iter().map(one));
+                refs.par_extend((0..count).into_par_iter().map(one));
             }
         }
     }

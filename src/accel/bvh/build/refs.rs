@@ -14,7 +14,6 @@ impl Box4 {
 
     #[inline(always)]
     pub(super) fn grow(&mut self, lo: Vec4, hi: Vec4) {
-        // What was there comes second: it stays where the fourth lane, an id, happens to be NaN.
         self.lo = lo.min(self.lo);
         self.hi = hi.max(self.hi);
     }
@@ -44,45 +43,51 @@ pub(super) enum Kind {
 }
 
 /// A primitive with its box: 32 bytes, as a build moves these about.
+///
+/// What it is stands in the fourth lanes, as the bits of numbers of ordinary size: vector code works on these lanes too,
+/// and would be many times slower if they looked like numbers below the normal range.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub(super) struct Ref {
-    /// Lower corner; the fourth lane holds the bits of kind and leaf.
+    /// Lower corner; the leaf or child, and a sign where it is no triangle.
     lo: Vec4,
-    /// Upper corner; the fourth lane holds the bits of the primitive.
+    /// Upper corner; the primitive, and a sign where it is a child.
     hi: Vec4,
 }
 
-const LEAF_BITS: u32 = 30;
-/// The most leaves of a group.
-pub(super) const MAX_LEAVES: usize = 1 << LEAF_BITS;
+/// The bits of 2: with any of those below [`MAX_NUMBER`] a number from 2 to 2^65.
+const ORDINARY: u32 = 1 << 30;
+const SIGN: u32 = 1 << 31;
+/// The most leaves or children of a group, and primitives of a leaf.
+pub(super) const MAX_NUMBER: usize = 1 << 29;
 
 impl Ref {
     pub(super) fn new(b: &crate::math::aabb::Aabb, kind: Kind) -> Self {
-        let (tag, leaf, prim) = match kind {
-            Kind::Triangle(leaf, prim) => (0, leaf, prim),
-            Kind::Shape(leaf, prim) => (1, leaf, prim),
-            Kind::Instance(child) => (2, child, 0),
+        let (lo, hi) = match kind {
+            Kind::Triangle(leaf, prim) => (leaf, prim),
+            Kind::Shape(leaf, prim) => (leaf | SIGN, prim),
+            Kind::Instance(child) => (child | SIGN, SIGN),
         };
         Ref {
-            lo: b.min.extend(f32::from_bits(tag << LEAF_BITS | leaf)),
-            hi: b.max.extend(f32::from_bits(prim)),
+            lo: b.min.extend(f32::from_bits(lo | ORDINARY)),
+            hi: b.max.extend(f32::from_bits(hi | ORDINARY)),
         }
     }
 
     pub(super) fn kind(&self) -> Kind {
-        let (word, prim) = (self.lo.w.to_bits(), self.hi.w.to_bits());
-        let leaf = word & ((1 << LEAF_BITS) - 1);
-        match word >> LEAF_BITS {
-            0 => Kind::Triangle(leaf, prim),
-            1 => Kind::Shape(leaf, prim),
-            _ => Kind::Instance(leaf),
+        let (lo, hi) = (self.lo.w.to_bits(), self.hi.w.to_bits());
+        let number = |w: u32| w & (MAX_NUMBER as u32 - 1);
+        match (lo & SIGN != 0, hi & SIGN != 0) {
+            (false, _) => Kind::Triangle(number(lo), number(hi)),
+            (true, false) => Kind::Shape(number(lo), number(hi)),
+            (true, true) => Kind::Instance(number(lo)),
         }
     }
 
-    /// A number that is the same for primitives of one kind.
-    pub(super) fn tag(&self) -> u32 {
-        self.lo.w.to_bits() >> LEAF_BITS
+    /// Whether two are of one kind.
+    pub(super) fn is_like(&self, o: &Ref) -> bool {
+        let signs = |r: &Ref| [r.lo.w.to_bits() & SIGN, r.hi.w.to_bits() & SIGN];
+        signs(self) == signs(o)
     }
 
     #[inline(always)]
@@ -98,7 +103,6 @@ impl Ref {
     /// Twice the middle of the box.
     #[inline(always)]
     pub(super) fn center2(&self) -> Vec4 {
-        // The fourth lanes are ids; a sum of those may be NaN, which nothing reads.
         self.lo + self.hi
     }
 }

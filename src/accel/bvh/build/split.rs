@@ -64,7 +64,8 @@ impl Binning {
         let size = set.centers.hi - set.centers.lo;
         let scale = Vec4::splat((bins - 1) as f32) / size;
         // An axis without extent, or whose extent overflows, has one bin.
-        let scale = Vec4::from_array(scale.to_array().map(|s| if s.is_finite() { s } else { 0.0 }));
+        let finite = |s: f32| if s.is_finite() { s } else { 0.0 };
+        let scale = Vec4::new(finite(scale.x), finite(scale.y), finite(scale.z), 0.0);
         Binning { base: set.centers.lo, scale, bins }
     }
 
@@ -76,17 +77,27 @@ impl Binning {
 }
 
 #[derive(Clone, Copy)]
-struct Bin {
+pub(super) struct Bin {
     bounds: Box4,
     count: u32,
 }
 
-type Bins = [[Bin; MAX_BINS]; 3];
+/// By axis.
+pub(super) type Bins = [[Bin; MAX_BINS]; 3];
 
-const NO_BINS: Bins = [[Bin { bounds: Box4::EMPTY, count: 0 }; MAX_BINS]; 3];
+pub(super) const NO_BINS: Bins = [[Bin { bounds: Box4::EMPTY, count: 0 }; MAX_BINS]; 3];
 
-fn fill(refs: &[Ref], binning: &Binning) -> Bins {
+fn filled(refs: &[Ref], binning: &Binning) -> Bins {
     let mut bins = NO_BINS;
+    fill(refs, binning, &mut bins);
+    bins
+}
+
+/// Fills the bins that are in use.
+fn fill(refs: &[Ref], binning: &Binning, bins: &mut Bins) {
+    for bins in bins.iter_mut() {
+        bins[..binning.bins].fill(NO_BINS[0][0]);
+    }
     for r in refs {
         let at = binning.of(r);
         for axis in 0..3 {
@@ -95,7 +106,6 @@ fn fill(refs: &[Ref], binning: &Binning) -> Bins {
             bin.count += 1;
         }
     }
-    bins
 }
 
 fn merge(mut a: Bins, b: Bins) -> Bins {
@@ -116,14 +126,21 @@ struct Plane {
     bounds: [Box4; 2],
 }
 
-/// What a set costs, for its number of primitives: those that are tested together count as one.
+/// What a set costs, for its number of primitives: those that are tested together, a power of two, count as one.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Units(pub(super) usize);
+pub(super) struct Units {
+    shift: u32,
+}
 
 impl Units {
+    pub(super) fn new(together: usize) -> Self {
+        Units { shift: together.ilog2() }
+    }
+
     #[inline(always)]
     fn of(self, n: u32) -> f32 {
-        (n as usize).div_ceil(self.0) as f32
+        // No division: this is asked for every plane of every split.
+        ((n + ((1 << self.shift) - 1)) >> self.shift) as f32
     }
 }
 
@@ -158,19 +175,19 @@ fn best_plane(bins: &Bins, binning: &Binning, units: Units) -> Option<Plane> {
 }
 
 /// Parts a set of at least two in two, neither of them empty, and moves its primitives accordingly. `refs` are all of the
-/// build's.
-pub(super) fn split(refs: &mut [Ref], set: &Set, bins: usize, units: Units) -> [Set; 2] {
+/// build's, `room` is scratch.
+pub(super) fn split(refs: &mut [Ref], set: &Set, bins: usize, units: Units, room: &mut Bins) -> [Set; 2] {
     let part = &mut refs[set.start..set.end];
     if set.depth < MAX_SAH_DEPTH {
         // Few primitives fill few bins.
         let bins = bins.min(MAX_BINS).min(4 + part.len() / 2);
         let binning = Binning::new(set, bins);
-        let filled = if part.len() >= PARALLEL {
-            part.par_chunks(PARALLEL / 8).map(|c| fill(c, &binning)).reduce(|| NO_BINS, merge)
+        if part.len() >= PARALLEL {
+            *room = part.par_chunks(PARALLEL / 8).map(|c| filled(c, &binning)).reduce(|| NO_BINS, merge);
         } else {
-            fill(part, &binning)
-        };
-        if let Some(plane) = best_plane(&filled, &binning, units) {
+            fill(part, &binning, room);
+        }
+        if let Some(plane) = best_plane(room, &binning, units) {
             return partition(part, set, &binning, &plane);
         }
     }

@@ -2,7 +2,7 @@
 //! there are eight (Wald, Benthin, Boulos, "Getting Rid of Packets", 2008).
 
 use super::refs::{Kind, Ref};
-use super::split::{Set, Units, split};
+use super::split::{Bins, NO_BINS, Set, Units, split};
 use crate::accel::bvh::layout::{
     Block, BlockIds, Child, Instance, MAX_INDEX, MAX_SHAPES, Node, ShapePrimitive, Target, Tree,
 };
@@ -179,10 +179,10 @@ impl Shape {
 pub(super) fn build_top(refs: &mut [Ref], set: Set, plan: &Plan) -> Result<Top> {
     if set.len() < PARALLEL {
         let mut part = Part::default();
-        let root = build_part(refs, &set, plan, &mut part)?;
+        let root = build_part(refs, &set, plan, &mut NO_BINS.clone(), &mut part)?;
         return Ok(Top::Part(part, root));
     }
-    let sets = eight_sets(refs, &set, plan);
+    let sets = eight_sets(refs, &set, plan, &mut NO_BINS.clone());
     // Each set's own primitives, so that the sets can be worked on at once.
     let mut rest = refs;
     let mut apart = Vec::with_capacity(sets.len());
@@ -213,18 +213,18 @@ fn is_leaf(refs: &[Ref], s: &Set, plan: &Plan) -> bool {
         Kind::Shape(..) => plan.shapes_per_leaf,
         Kind::Instance(_) => 1,
     };
-    part.len() <= most && part.iter().all(|r| r.tag() == part[0].tag())
+    part.len() <= most && part.iter().all(|r| r.is_like(&part[0]))
 }
 
 /// Up to eight sets, in the order of their primitives; one if the set is a leaf.
-fn eight_sets(refs: &mut [Ref], set: &Set, plan: &Plan) -> Vec<Set> {
+fn eight_sets(refs: &mut [Ref], set: &Set, plan: &Plan, room: &mut Bins) -> Vec<Set> {
     let mut sets = Vec::with_capacity(LANES);
     sets.push((*set, is_leaf(refs, set, plan)));
     while sets.len() < LANES {
         let area = |i: &usize| sets[*i].0.bounds.half_area();
         let inner = (0..sets.len()).filter(|&i| !sets[i].1);
         let Some(largest) = inner.max_by(|a, b| area(a).total_cmp(&area(b))) else { break };
-        let [left, right] = split(refs, &sets[largest].0, plan.bins, plan.units);
+        let [left, right] = split(refs, &sets[largest].0, plan.bins, plan.units, room);
         sets[largest] = (left, is_leaf(refs, &left, plan));
         sets.insert(largest + 1, (right, is_leaf(refs, &right, plan)));
     }
@@ -232,18 +232,18 @@ fn eight_sets(refs: &mut [Ref], set: &Set, plan: &Plan) -> Vec<Set> {
 }
 
 /// Builds a set into `part`. Recursion is as deep as the tree, which `split` bounds.
-fn build_part(refs: &mut [Ref], set: &Set, plan: &Plan, part: &mut Part) -> Result<Child> {
+fn build_part(refs: &mut [Ref], set: &Set, plan: &Plan, room: &mut Bins, part: &mut Part) -> Result<Child> {
     if is_leaf(refs, set, plan) {
         return leaf(&refs[set.start..set.end], plan, part);
     }
-    let sets = eight_sets(refs, set, plan);
+    let sets = eight_sets(refs, set, plan, room);
     let index = part.nodes.len();
     if index >= MAX_INDEX {
         return Err(too_many());
     }
     part.nodes.push(Node::empty());
     for (lane, s) in sets.iter().enumerate() {
-        let child = build_part(refs, s, plan, part)?;
+        let child = build_part(refs, s, plan, room, part)?;
         part.nodes[index].set(lane, &bounds(s), child);
     }
     Ok(Child::new(Target::Node(index)))
