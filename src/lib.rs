@@ -10,6 +10,7 @@ pub mod bench;
 pub mod cameras;
 pub mod cli;
 pub mod color;
+pub mod crosscheck;
 pub mod error;
 pub mod formats;
 pub mod image;

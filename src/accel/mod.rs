@@ -86,7 +86,7 @@ impl LocalRay {
 
 /// Whether the leaf's filter lets a hit of `ray` (in the space of the leaf's group) stand. The filter sees a ray that
 /// ends at the hit, as what lies beyond differs from kernel to kernel.
-fn accepted(leaf: &Leaf, ray: &LocalRay, hit: &Hit, key: u32) -> bool {
+pub fn accepted(leaf: &Leaf, ray: &LocalRay, hit: &Hit, key: u32) -> bool {
     leaf.filter.as_ref().is_none_or(|f| f.accept(&Ray { tfar: hit.t, ..ray.to_ray(key) }, hit))
 }
 

@@ -51,7 +51,7 @@ pub trait Intersectable: Send + Sync {
 }
 
 /// What is asked of a ray.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum QueryKind {
     /// The closest hit.
     Closest,

@@ -11,7 +11,7 @@ use crate::base::light::{ChosenLight, LightSample, Receiver};
 use crate::base::material::{Material, Prepared};
 use crate::base::vertex::Vertex;
 use crate::color::Rgb;
-use crate::sampler::{Dim, Slot, ray_key};
+use crate::sampler::{Dim, SHADOW_KEY, Slot, ray_key};
 use crate::sampling::mis::power;
 use crate::scene::Scene;
 use glam::Vec3;
@@ -149,9 +149,6 @@ impl Block<'_> {
         paths.pending.push(Pending { value: value * (weight / pdf), index: s.state.index, ask });
     }
 }
-
-/// Sets the keys of shadow rays apart from those of scattered rays.
-const SHADOW_KEY: u32 = 0x9e37_79b9;
 
 #[inline]
 fn key(id: &PathId, depth: u32) -> u32 {

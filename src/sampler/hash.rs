@@ -31,6 +31,9 @@ pub const fn ray_key(pixel: u32, sample: u32, depth: u32) -> u32 {
     mix32(mix32(mix32(pixel.wrapping_add(0x9e37_79b9)) ^ sample).wrapping_add(depth))
 }
 
+/// Sets the keys of shadow rays apart from those of scattered rays: `ray_key(..) ^ SHADOW_KEY`.
+pub const SHADOW_KEY: u32 = 0x9e37_79b9;
+
 /// A uniform number in [0, 1) from a ray's key and what the decision is about (such as the primitive's id).
 #[inline(always)]
 pub fn uniform_from_key(key: u32, about: u32) -> f32 {

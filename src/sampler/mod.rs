@@ -8,7 +8,7 @@ pub mod owen_sobol;
 use std::str::FromStr;
 
 pub use dims::{Dim, Slot};
-pub use hash::ray_key;
+pub use hash::{SHADOW_KEY, ray_key};
 
 use crate::error::{Error, Result, unknown_name};
 use crate::math::simd::{Kernel, dispatch};
