@@ -2,6 +2,7 @@
 
 mod args;
 mod bench;
+mod crosscheck;
 mod info;
 mod interrupt;
 mod list;
@@ -70,6 +71,8 @@ enum Verb {
     Info(Box<info::InfoArgs>),
     /// Measure: how fast every kernel answers the same rays
     Bench(Box<bench::BenchArgs>),
+    /// Send every ray of a render through every kernel, judge the differences, and compare the pictures
+    Crosscheck(Box<crosscheck::CrosscheckArgs>),
     /// List every registered kind with its parameters
     List(list::ListArgs),
     /// Print the completions of a shell
@@ -113,6 +116,7 @@ fn run() -> Result<(), Failure> {
         Verb::Render(args) => render::run(args, &setting)?,
         Verb::Info(args) => info::run(args, &setting)?,
         Verb::Bench(args) => bench::run(args, &setting)?,
+        Verb::Crosscheck(args) => crosscheck::run(args, &setting)?,
         Verb::List(args) => list::run(args)?,
         Verb::Completions(args) => manual::completions(args)?,
         Verb::Man(args) => manual::man(args)?,

@@ -84,9 +84,18 @@ struct KernelArgs {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum ModeArg {
+pub(super) enum ModeArg {
     Robust,
     Fast,
+}
+
+impl From<ModeArg> for KernelMode {
+    fn from(mode: ModeArg) -> Self {
+        match mode {
+            ModeArg::Robust => KernelMode::Robust,
+            ModeArg::Fast => KernelMode::Fast,
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -102,7 +111,9 @@ pub fn run(args: &RenderArgs, setting: &Setting) -> Result<()> {
     let plan = args.check()?;
     let desc = args.scene.load()?;
     let settings = args.sampling.settings(&desc, &plan, setting.threads)?;
-    let renderer = Renderer { integrator: args.sampling.integrator(&desc)?, settings };
+    let s = &args.sampling;
+    let integrator = choose_integrator(&desc, s.integrator.as_deref(), s.max_depth)?;
+    let renderer = Renderer { integrator, settings };
     let load = start.elapsed();
     if desc.objects.is_empty() {
         log::warn!("the scene has no object: only the sky can be seen");
@@ -185,25 +196,29 @@ impl SamplingArgs {
             ..usual
         })
     }
+}
 
-    /// The scene's integrator keeps its parameters unless another one is asked for.
-    fn integrator(&self, scene: &SceneDesc) -> Result<Arc<dyn Integrator>> {
-        let default = integrators::REGISTRY.first().map_or("", |r| r.kind);
-        let of_scene = scene.render.integrator.clone().unwrap_or_else(|| named(default));
-        let mut node = match &self.integrator {
-            Some(name) if *name != of_scene.kind => named(name),
-            _ => of_scene,
-        };
-        if let Some(depth) = self.max_depth {
-            let row = registry::find("integrator", integrators::REGISTRY, &node)?;
-            if !row.params.iter().any(|p| p.name == MAX_DEPTH) {
-                return Err(Error::Usage(format!("the integrator \"{}\" has no --max-depth", node.kind)));
-            }
-            node.params.list.retain(|p| p.name != MAX_DEPTH);
-            node.params = std::mem::take(&mut node.params).with(MAX_DEPTH, Value::Number(f64::from(depth)));
+/// The scene's integrator keeps its parameters unless another one is asked for.
+pub(super) fn choose_integrator(
+    scene: &SceneDesc,
+    name: Option<&str>,
+    max_depth: Option<u32>,
+) -> Result<Arc<dyn Integrator>> {
+    let default = integrators::REGISTRY.first().map_or("", |r| r.kind);
+    let of_scene = scene.render.integrator.clone().unwrap_or_else(|| named(default));
+    let mut node = match name {
+        Some(name) if *name != of_scene.kind => named(name),
+        _ => of_scene,
+    };
+    if let Some(depth) = max_depth {
+        let row = registry::find("integrator", integrators::REGISTRY, &node)?;
+        if !row.params.iter().any(|p| p.name == MAX_DEPTH) {
+            return Err(Error::Usage(format!("the integrator \"{}\" has no --max-depth", node.kind)));
         }
-        registry::build("integrator", integrators::REGISTRY, &node)
+        node.params.list.retain(|p| p.name != MAX_DEPTH);
+        node.params = std::mem::take(&mut node.params).with(MAX_DEPTH, Value::Number(f64::from(depth)));
     }
+    registry::build("integrator", integrators::REGISTRY, &node)
 }
 
 const MAX_DEPTH: &str = "max_depth";
@@ -219,10 +234,7 @@ impl KernelArgs {
             Some(QualityArg::Best) => BuildQuality::Best,
             Some(QualityArg::Balanced) | None => BuildQuality::Balanced,
         };
-        let mode = match self.kernel_mode {
-            Some(ModeArg::Fast) => KernelMode::Fast,
-            Some(ModeArg::Robust) | None => KernelMode::Robust,
-        };
+        let mode = self.kernel_mode.map_or(KernelMode::Robust, KernelMode::from);
         let backend = self.backend.clone().unwrap_or_else(|| "auto".into());
         BuildOptions { backend, kernel: KernelOptions { quality, mode, threads, simd: None } }
     }

@@ -140,9 +140,8 @@ fn of_shape(shape: &dyn Shape, prim: u32, at: &LeafRay, mut each: impl FnMut(Cro
     let b = shape.primitive_bounds(prim);
     let span = (b.center().as_dvec3() - ray.o).length() + f64::from(b.radius());
     let length = ray.d.length();
-    let spread = at.origin_error.length()
-        + span / length * at.direction_error.length()
-        + f64::from(gamma(8)) * span;
+    let spread =
+        at.origin_error.length() + span / length * at.direction_error.length() + f64::from(gamma(8)) * span;
     // The box bounds the crossings, whatever the range asked: shapes are asked a little beyond it at both ends.
     let room = 4.0 * spread / length;
     let range = [ray.tnear - room, ray.tfar + room];

@@ -31,11 +31,8 @@ pub struct Descent {
 impl Descent {
     /// At the root, where nothing has been rounded yet.
     pub fn new(ray: &Ray) -> Self {
-        let local = LeafRay {
-            ray: local_ray(ray, None),
-            origin_error: DVec3::ZERO,
-            direction_error: DVec3::ZERO,
-        };
+        let local =
+            LeafRay { ray: local_ray(ray, None), origin_error: DVec3::ZERO, direction_error: DVec3::ZERO };
         Descent { render: *ray, from_render: None, local }
     }
 

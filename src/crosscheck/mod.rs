@@ -14,6 +14,7 @@ pub mod locate;
 pub mod oracle;
 pub mod pictures;
 pub mod replay;
+pub mod summary;
 pub mod tally;
 #[cfg(test)]
 mod tests;
@@ -119,8 +120,7 @@ pub fn run(scene: &mut Scene, plan: &Plan, progress: &dyn Progress) -> Result<Cr
     plan.settings.check()?;
     let placed = [scene.film.width, scene.film.height];
     if plan.settings.size != placed {
-        let message =
-            format!("the camera was placed for a film of {placed:?}, not {:?}", plan.settings.size);
+        let message = format!("the camera was placed for a film of {placed:?}, not {:?}", plan.settings.size);
         return Err(Error::Usage(message));
     }
     if plan.contenders.is_empty() {

@@ -82,12 +82,7 @@ impl Possible {
 
 /// A primitive by its name, with the ray in its space; none where there is no such primitive, and for rays that no
 /// kernel is to answer.
-pub fn find<'a>(
-    geometry: &'a Geometry,
-    ray: &Ray,
-    path: u64,
-    prim: u32,
-) -> Option<(Primitive<'a>, LeafRay)> {
+pub fn find<'a>(geometry: &'a Geometry, ray: &Ray, path: u64, prim: u32) -> Option<(Primitive<'a>, LeafRay)> {
     let (leaf, local) = Descent::new(ray).to_leaf(geometry, path).filter(|_| ray.is_valid())?;
     (prim < leaf.shape.primitive_count()).then_some((Primitive { leaf, path, prim, key: ray.key }, local))
 }

@@ -43,9 +43,11 @@ pub fn read_ray(s: &str) -> Result<Ray, String> {
     let ray =
         Ray { o: Vec3::new(n[0], n[1], n[2]), d: Vec3::new(n[3], n[4], n[5]), tnear: n[6], tfar: n[7], key };
     if !ray.is_valid() {
-        return Err("no kernel may be given this ray: it needs a finite origin, a finite direction other than \
+        return Err(
+            "no kernel may be given this ray: it needs a finite origin, a finite direction other than \
             zero, and 0 <= tnear <= tfar"
-            .into());
+                .into(),
+        );
     }
     Ok(ray)
 }
@@ -170,7 +172,9 @@ impl fmt::Display for Replay<'_> {
         }
         f.write_str(&text)?;
         let verdict = match self.passed() {
-            true if self.asked.iter().all(|(_, _, j)| j.reason() == super::judge::Ruling::Right) => "all agree",
+            true if self.asked.iter().all(|(_, _, j)| j.reason() == super::judge::Ruling::Right) => {
+                "all agree"
+            }
             true => "explained by rounding",
             false => "NOT explained",
         };

@@ -47,7 +47,8 @@ impl TriangleTest {
         if mixed(edges, [coarse_bound(at, &v); 3]) {
             return None;
         }
-        let edge_bounds = [edge_bound(at, v[1], v[2]), edge_bound(at, v[2], v[0]), edge_bound(at, v[0], v[1])];
+        let edge_bounds =
+            [edge_bound(at, v[1], v[2]), edge_bound(at, v[2], v[0]), edge_bound(at, v[0], v[1])];
         if mixed(edges, edge_bounds) {
             return None;
         }
@@ -87,7 +88,13 @@ fn sum(v: DVec3) -> f64 {
 /// See the module.
 fn edge_bound(at: &LeafRay, a: DVec3, b: DVec3) -> f64 {
     let d = at.ray.d.abs();
-    let k = if d.x >= d.y && d.x >= d.z { 0 } else if d.y >= d.z { 1 } else { 2 };
+    let k = if d.x >= d.y && d.x >= d.z {
+        0
+    } else if d.y >= d.z {
+        1
+    } else {
+        2
+    };
     let small = d[(k + 1) % 3].min(d[(k + 2) % 3]);
     let (products, edge_and_sum) = (terms(a, b), 0.5 * terms(b - a, a + b));
     let arithmetic = d.dot(products + edge_and_sum) + small * (a[k] * b[k]).abs();

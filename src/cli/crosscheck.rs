@@ -1,0 +1,157 @@
+//! `skylit crosscheck`: every ray of a render through every kernel, and the same picture by each.
+
+use super::progress::Bar;
+use super::render::{ModeArg, choose_integrator};
+use super::scene_args::SceneArgs;
+use super::{Setting, interrupt, print};
+use crate::accel;
+use crate::base::intersectable::{KernelMode, KernelOptions};
+use crate::base::ray::Ray;
+use crate::crosscheck::compare::Contender;
+use crate::crosscheck::replay::{Replay, read_ray};
+use crate::crosscheck::summary::Summary;
+use crate::crosscheck::{ORACLE_TESTS, Plan, run as compare};
+use crate::error::{Error, Result, unknown_name};
+use crate::image::write::{check_file, write_file};
+use crate::render::settings::RenderSettings;
+use crate::scene::Scene;
+use crate::scene::build::{BuildOptions, build};
+use clap::Args;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Flags of `skylit crosscheck`.
+#[derive(Args)]
+pub struct CrosscheckArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Samples a pixel
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Rays")]
+    spp: u32,
+    /// Whose rays are compared (see `skylit list integrator`) [default: path]
+    #[arg(long, value_name = "NAME", help_heading = "Rays")]
+    integrator: Option<String>,
+    /// Longest path in surfaces, the camera's first hit counted
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), help_heading = "Rays")]
+    max_depth: Option<u32>,
+    /// Seed of every random choice [default: 0]
+    #[arg(long, value_name = "N", help_heading = "Rays")]
+    seed: Option<u64>,
+    /// This ray alone, in render space, as a crosscheck prints it: what every kernel and the oracle say of it
+    #[arg(long, value_name = "ox,oy,oz,dx,dy,dz,tnear,tfar", allow_hyphen_values = true, value_parser = read_ray, help_heading = "Rays")]
+    ray: Option<Ray>,
+    /// The kernels; the first decides which rays there are [default: all but the oracle, brute]
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', help_heading = "Ray kernels")]
+    backend: Vec<String>,
+    /// Whether rays may slip through between triangles for speed [default: robust]
+    #[arg(long, value_name = "robust|fast", help_heading = "Ray kernels")]
+    kernel_mode: Option<ModeArg>,
+    /// Write it as JSON, too
+    #[arg(long, value_name = "FILE", conflicts_with = "ray", help_heading = "Output")]
+    json: Option<PathBuf>,
+}
+
+/// Runs the verb.
+pub fn run(args: &CrosscheckArgs, setting: &Setting) -> Result<()> {
+    let names = args.kernels()?;
+    args.json.as_deref().map_or(Ok(()), check_file)?;
+    let desc = args.scene.load()?;
+    let integrator = choose_integrator(&desc, args.integrator.as_deref(), args.max_depth)?;
+    let settings = RenderSettings {
+        spp: args.spp,
+        seed: args.seed.or(desc.render.seed).unwrap_or(0),
+        threads: setting.threads,
+        ..RenderSettings::new(desc.film.size)
+    };
+    let mode = args.kernel_mode.map_or(KernelMode::Robust, KernelMode::from);
+    let kernel = KernelOptions { mode, threads: setting.threads, ..KernelOptions::default() };
+    // The kernel that needs no build: those to be compared are built over its geometry.
+    let mut scene = build(desc, &BuildOptions { backend: "brute".into(), kernel })?;
+    let contenders = build_kernels(&names, &scene, &kernel)?;
+    if let Some(ray) = args.ray {
+        return replay(&scene, &contenders, ray);
+    }
+    let plan = Plan { contenders, integrator, settings, oracle_tests: ORACLE_TESTS };
+    let bar = Bar::new(setting.quiet, None);
+    let done = compare(&mut scene, &plan, &bar);
+    bar.finish();
+    let done = done?;
+    let summary = Summary::new(&done, &scene, &command());
+    interrupt::hold_off(|| match &args.json {
+        Some(path) => {
+            let text = serde_json::to_string_pretty(&summary)
+                .map_err(|e| Error::Internal(format!("cannot write the record: {e}")))?;
+            write_file(path, (text + "\n").as_bytes())
+        }
+        None => Ok(()),
+    })?;
+    print(summary.to_string().as_bytes())?;
+    if summary.passed { Ok(()) } else { Err(Error::Failed(format!("crosscheck: {}", summary.verdict))) }
+}
+
+fn replay(scene: &Scene, contenders: &[Contender], ray: Ray) -> Result<()> {
+    let replay = Replay::new(scene, contenders, ray, ORACLE_TESTS);
+    print(replay.to_string().as_bytes())?;
+    match replay.passed() {
+        true => Ok(()),
+        false => Err(Error::Failed("crosscheck: rounding does not explain every answer to this ray".into())),
+    }
+}
+
+fn build_kernels(names: &[&'static str], scene: &Scene, options: &KernelOptions) -> Result<Vec<Contender>> {
+    let built = names.iter().map(|name| {
+        let kernel = accel::build_kernel(name, scene.geometry.clone(), options)?;
+        log::info!("{}", kernel.describe());
+        Ok(Contender { name: (*name).to_owned(), kernel: Arc::from(kernel) })
+    });
+    built.collect()
+}
+
+/// The oracle's name among the kernels.
+const ORACLE: &str = "brute";
+
+impl CrosscheckArgs {
+    /// The names of the kernels that are wanted, each once.
+    fn kernels(&self) -> Result<Vec<&'static str>> {
+        let all = accel::KERNELS.iter().map(|k| k.name);
+        if self.backend.is_empty() {
+            let others: Vec<&str> = all.filter(|n| *n != ORACLE).collect();
+            return Ok(if others.is_empty() { vec![ORACLE] } else { others });
+        }
+        let mut names = Vec::new();
+        for wanted in &self.backend {
+            let found = all.clone().find(|n| n == wanted);
+            let name = found.ok_or_else(|| Error::Usage(unknown_name("backend", wanted, all.clone())))?;
+            if names.contains(&name) {
+                return Err(Error::Usage(format!("--backend names {name} twice")));
+            }
+            names.push(name);
+        }
+        Ok(names)
+    }
+}
+
+/// This command without what it writes and the ray it asks, as a shell reads it.
+fn command() -> String {
+    let mut words = vec!["skylit".to_owned()];
+    let mut args = std::env::args_os().skip(1).map(|a| a.to_string_lossy().into_owned());
+    while let Some(word) = args.next() {
+        let flag = word.split('=').next().unwrap_or("");
+        if ["--json", "--html", "--ray"].contains(&flag) {
+            if flag == word {
+                args.next();
+            }
+            continue;
+        }
+        words.push(quoted(&word));
+    }
+    words.join(" ")
+}
+
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_=+,.:/@%^".contains(c);
+    match !word.is_empty() && word.chars().all(plain) {
+        true => word.to_owned(),
+        false => format!("'{}'", word.replace('\'', r"'\''")),
+    }
+}
