@@ -10,13 +10,15 @@ use crate::base::ray::Ray;
 use crate::crosscheck::compare::Contender;
 use crate::crosscheck::replay::{Replay, read_ray};
 use crate::crosscheck::summary::Summary;
-use crate::crosscheck::{ORACLE_TESTS, Plan, run as compare};
+use crate::crosscheck::{ORACLE_TESTS, Plan, html, run as compare};
 use crate::error::{Error, Result, unknown_name};
 use crate::image::write::{check_file, write_file};
 use crate::render::settings::RenderSettings;
+use crate::report::machine::{self, Machine};
 use crate::scene::Scene;
 use crate::scene::build::{BuildOptions, build};
 use clap::Args;
+use serde::Serialize;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -49,12 +51,15 @@ pub struct CrosscheckArgs {
     /// Write it as JSON, too
     #[arg(long, value_name = "FILE", conflicts_with = "ray", help_heading = "Output")]
     json: Option<PathBuf>,
+    /// Write it as a page with the pictures, their difference and the places, too
+    #[arg(long, value_name = "FILE", conflicts_with = "ray", help_heading = "Output")]
+    html: Option<PathBuf>,
 }
 
 /// Runs the verb.
 pub fn run(args: &CrosscheckArgs, setting: &Setting) -> Result<()> {
     let names = args.kernels()?;
-    args.json.as_deref().map_or(Ok(()), check_file)?;
+    [&args.json, &args.html].into_iter().flatten().try_for_each(|path| check_file(path))?;
     let desc = args.scene.load()?;
     let integrator = choose_integrator(&desc, args.integrator.as_deref(), args.max_depth)?;
     let settings = RenderSettings {
@@ -77,16 +82,29 @@ pub fn run(args: &CrosscheckArgs, setting: &Setting) -> Result<()> {
     bar.finish();
     let done = done?;
     let summary = Summary::new(&done, &scene, &command());
-    interrupt::hold_off(|| match &args.json {
-        Some(path) => {
-            let text = serde_json::to_string_pretty(&summary)
-                .map_err(|e| Error::Internal(format!("cannot write the record: {e}")))?;
-            write_file(path, (text + "\n").as_bytes())
-        }
-        None => Ok(()),
+    let machine = Machine::here();
+    let json = args.json.as_ref().map(|_| to_json(&machine, &summary)).transpose()?;
+    let input = args.scene.input.display().to_string();
+    let html = args.html.as_ref().map(|_| html::page(&done, &summary, &machine, &input)).transpose()?;
+    interrupt::hold_off(|| {
+        let files = [(&args.json, json), (&args.html, html)];
+        let files = files.iter().filter_map(|(path, text)| path.as_ref().zip(text.as_ref()));
+        files.into_iter().try_for_each(|(path, text)| write_file(path, text.as_bytes()))
     })?;
     print(summary.to_string().as_bytes())?;
     if summary.passed { Ok(()) } else { Err(Error::Failed(format!("crosscheck: {}", summary.verdict))) }
+}
+
+/// The record: where it was taken, and what came out.
+#[derive(Serialize)]
+struct Record<'a> {
+    machine: &'a Machine,
+    crosscheck: &'a Summary,
+}
+
+fn to_json(machine: &Machine, crosscheck: &Summary) -> Result<String> {
+    let text = serde_json::to_string_pretty(&Record { machine, crosscheck });
+    text.map(|t| t + "\n").map_err(|e| Error::Internal(format!("cannot write the record: {e}")))
 }
 
 fn replay(scene: &Scene, contenders: &[Contender], ray: Ray) -> Result<()> {
@@ -133,25 +151,15 @@ impl CrosscheckArgs {
 
 /// This command without what it writes and the ray it asks, as a shell reads it.
 fn command() -> String {
-    let mut words = vec!["skylit".to_owned()];
-    let mut args = std::env::args_os().skip(1).map(|a| a.to_string_lossy().into_owned());
+    let mut words = Vec::new();
+    let mut args = std::env::args_os().map(|a| a.to_string_lossy().into_owned());
     while let Some(word) = args.next() {
         let flag = word.split('=').next().unwrap_or("");
-        if ["--json", "--html", "--ray"].contains(&flag) {
-            if flag == word {
-                args.next();
-            }
-            continue;
+        if !["--json", "--html", "--ray"].contains(&flag) {
+            words.push(word);
+        } else if flag == word {
+            args.next();
         }
-        words.push(quoted(&word));
     }
-    words.join(" ")
-}
-
-fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_alphanumeric() || "-_=+,.:/@%^".contains(c);
-    match !word.is_empty() && word.chars().all(plain) {
-        true => word.to_owned(),
-        false => format!("'{}'", word.replace('\'', r"'\''")),
-    }
+    machine::command(words.into_iter())
 }

@@ -143,7 +143,7 @@ fn os() -> String {
 }
 
 /// As a shell would read it again; the program by its name alone.
-fn command(args: impl Iterator<Item = String>) -> String {
+pub fn command(args: impl Iterator<Item = String>) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_=+,.:/@%^".contains(c);
     let quoted = |(i, arg): (usize, String)| {
         let arg = if i == 0 { arg.rsplit(['/', '\\']).next().unwrap_or("skylit").to_owned() } else { arg };

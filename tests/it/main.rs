@@ -2,6 +2,7 @@
 
 mod cli;
 mod common;
+mod crosscheck;
 mod geometry;
 mod kernels;
 mod layers;

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod bench;
+mod crosscheck;
 mod folder;
 
 use folder::{Folder, QUICK};
