@@ -3,7 +3,7 @@
 mod judging;
 mod kernels;
 
-use super::judge::{Class, Fault, Ruling};
+use super::judge::{Class, Fault};
 use super::locate::RayKind;
 use super::summary::Summary;
 use super::*;
@@ -97,7 +97,7 @@ fn a_kernel_agrees_with_itself_and_every_ray_is_compared() {
     assert!(c.passed() && c.tally.differences() == 0, "{:?}", c.tally);
     assert_eq!(c.compared, c.rays.total());
     assert_eq!(c.rays.camera, 24 * 16 * 4);
-    assert!(c.rays.scattered > 200 && c.rays.shadow > 200, "{:?}", c.rays);
+    assert!(c.rays.scattered > 200 && c.rays.shadow > 50, "{:?}", c.rays);
     assert!(c.pictures.against_first[0].pixels.is_empty());
     assert_eq!(scene.kernel.describe(), "brute", "the scene has its kernel back");
 }
@@ -110,7 +110,8 @@ fn the_kernels_of_this_build_pass() {
         let kernel = (k.build)(scene.geometry.clone(), &KernelOptions::default()).unwrap();
         Contender { name: k.name.into(), kernel: Arc::from(kernel) }
     };
-    let c = check(&mut scene, KERNELS.iter().map(build).collect());
+    let contenders = KERNELS.iter().map(build).collect();
+    let c = check(&mut scene, contenders);
     assert!(c.passed(), "{}", Summary::new(&c, &scene, "skylit"));
 }
 
