@@ -138,6 +138,9 @@ pub fn say(scene: &Scene, answer: &Answer) -> String {
     }
 }
 
+/// Candidates that are printed, the nearest first.
+const LISTED: usize = 12;
+
 fn say_crossing(c: &Crossing) -> String {
     let met = if c.met { "met" } else { "not met" };
     let doubt = c.doubt.map_or(String::from("surely"), |d| d.text().to_owned());
@@ -161,7 +164,9 @@ impl fmt::Display for Replay<'_> {
             None => writeln!(f, "  meets    nothing")?,
         }
         let mut text = String::new();
-        for c in &self.possible.candidates {
+        let mut nearest: Vec<_> = self.possible.candidates.iter().collect();
+        nearest.sort_by(|a, b| a.crossing.t.total_cmp(&b.crossing.t));
+        for c in nearest.iter().take(LISTED) {
             let name = name_of(self.scene, c.path, c.prim);
             writeln!(text, "  may meet {name}: {}", say_crossing(&c.crossing))?;
             if let Some(e) = self.edges(c.path, c.prim) {
@@ -169,6 +174,9 @@ impl fmt::Display for Replay<'_> {
                 let pairs: Vec<String> = pairs.map(|(e, b)| format!("{e:.3e} +- {b:.1e}")).collect();
                 writeln!(text, "           edge functions {}", pairs.join(", "))?;
             }
+        }
+        if nearest.len() > LISTED {
+            writeln!(text, "  and {} more beyond", nearest.len() - LISTED)?;
         }
         f.write_str(&text)?;
         let verdict = match self.passed() {
