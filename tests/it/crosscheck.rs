@@ -1,4 +1,4 @@
-//! The scenes of the gallery through every kernel: whatever differs is explained by rounding.
+//! Scenes through every kernel: whatever differs is explained by rounding.
 
 use crate::common::integrator;
 use skylit::accel::KERNELS;
@@ -14,11 +14,11 @@ use std::sync::Arc;
 
 /// Small pictures of few samples: some ten thousand rays a scene.
 #[test]
-fn the_gallery_passes() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
-    let mut passed = 0;
-    for name in ["hero", "island", "knot-midday", "nested", "primitives"] {
-        let mut desc = skylit::formats::load(&folder.join(format!("{name}.toml"))).unwrap();
+fn every_kernel_passes() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    // Groups within groups; a mesh under a picture of a sky; area lights. The others take long to generate.
+    for name in ["scenes/nested.toml", "tests/reference/clay.toml", "tests/reference/lamps.toml"] {
+        let mut desc = skylit::formats::load(&root.join(name)).unwrap();
         desc.film.size = [80, 45];
         let mut scene =
             build(desc, &BuildOptions { backend: "brute".into(), ..BuildOptions::default() }).unwrap();
@@ -38,7 +38,5 @@ fn the_gallery_passes() {
         let check = run(&mut scene, &plan, &Silent).unwrap();
         assert!(check.passed(), "{name}\n{}", Summary::new(&check, &scene, "skylit"));
         assert_eq!(check.rays.camera, 80 * 45 * 2);
-        passed += 1;
     }
-    assert_eq!(passed, 5);
 }
