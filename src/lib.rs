@@ -8,6 +8,7 @@ pub mod accel;
 pub mod base;
 pub mod bench;
 pub mod cameras;
+pub mod check;
 pub mod cli;
 pub mod color;
 pub mod crosscheck;

@@ -85,8 +85,8 @@ impl Level {
     fn parse(text: &str) -> Result<Level> {
         let names = Level::ALL.map(Level::name);
         let level = Level::ALL.into_iter().find(|l| l.name() == text);
-        let level = level
-            .ok_or_else(|| Error::Usage(unknown_name("instruction set in SKYLIT_SIMD", text, names)))?;
+        let level =
+            level.ok_or_else(|| Error::Usage(unknown_name("instruction set in SKYLIT_SIMD", text, names)))?;
         if level.is_available() {
             return Ok(level);
         }
