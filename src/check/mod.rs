@@ -8,6 +8,7 @@ pub mod bodies;
 pub mod certificate;
 pub mod exact;
 pub mod leaks;
+mod present;
 pub mod quadrics;
 pub mod random;
 pub mod solid;
@@ -250,8 +251,12 @@ impl Run<'_> {
     fn tunnelling(&mut self, target: &Target, sheets: &Sheets) -> Result<()> {
         let with_sheets = Target { geometry: sheets.geometry.clone(), ..*target };
         for t in self.kernels(&with_sheets, self.options.rays.div_ceil(self.targets))? {
-            let tally = tunnelling(sheets, &*t.kernel, t.rays, target.seed);
-            self.certificate.add(Check::Tunnelling, [target.body, target.placement], &t.name, tally);
+            for (check, lifted) in [(Check::Tunnelling, false), (Check::LiftedTunnelling, true)] {
+                if !lifted || sheets.is_smooth() {
+                    let tally = tunnelling(sheets, &*t.kernel, lifted, t.rays, target.seed);
+                    self.certificate.add(check, [target.body, target.placement], &t.name, tally);
+                }
+            }
         }
         Ok(())
     }

@@ -80,7 +80,11 @@ fn run_batch(
     for i in 0..b.arriving.len() {
         let Some(hit) = b.hits.get(i) else { continue };
         let ray = b.arriving.get(i);
-        let vertex = vertex_at(geometry, &ray, hit);
+        let mut vertex = vertex_at(geometry, &ray, hit);
+        // Smooth shading lifts origins off the surface: half the rays start without.
+        if i % 2 == 1 {
+            vertex.lift = Vec3::ZERO;
+        }
         let order = batch.first + i as u64;
         if let Some(plane) = Plane::of(geometry, hit.path, hit.prim) {
             arrived(&mut tallies, &vertex, &plane, &ray, hit.t, order);

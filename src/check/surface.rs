@@ -8,6 +8,7 @@ use crate::base::ray::Ray;
 use crate::base::shape::Needs;
 use crate::base::vertex::{Origin, Vertex, local_ray};
 use crate::math::aabb::DAabb;
+use crate::math::bounds::UNDERFLOW;
 use glam::{DVec3, Vec3};
 
 /// A ray to a random point of a random primitive of a random leaf, from up to two radii of the leaf to any side of the
@@ -53,14 +54,15 @@ pub fn vertex_at(geometry: &Geometry, ray: &Ray, hit: Hit) -> Vertex {
     Vertex::new(ray, &surface, placement, Origin { hit, object: 0, slot: 0, spread: 0.0 })
 }
 
-/// The vertex's bound along its normal: how far from the surface a ray must start.
+/// The vertex's bound along its normal: how far from the surface a ray must start. Where it is below the normal numbers,
+/// in planes of a coordinate 0, that is their smallest.
 pub fn bound(v: &Vertex) -> f64 {
-    f64::from(v.ng.abs().dot(v.error))
+    f64::from(v.ng.abs().dot(v.error)).max(UNDERFLOW)
 }
 
-/// The spacing of f32 numbers at a point, along a direction: what placing an origin there costs at least.
+/// The spacing of normal f32 numbers at a point, along a direction: what placing an origin there costs at least.
 pub fn spacing(p: Vec3, n: Vec3) -> f64 {
-    let ulp = |x: f32| f64::from(x.abs().next_up()) - f64::from(x.abs());
+    let ulp = |x: f32| (f64::from(x.abs().next_up()) - f64::from(x.abs())).max(UNDERFLOW);
     n.abs().as_dvec3().dot(DVec3::new(ulp(p.x), ulp(p.y), ulp(p.z)))
 }
 

@@ -87,6 +87,14 @@ impl Sheets {
     }
 }
 
+impl Sheets {
+    /// Whether the mesh has shading normals, which lift origins.
+    pub fn is_smooth(&self) -> bool {
+        let shape = &self.geometry.resolve(self.path).leaf.shape;
+        shape.triangles().is_some_and(|m| !m.normals.is_empty())
+    }
+}
+
 /// The geometry with more leaves in a group without children, which is the root or the one child of the root.
 fn with_leaves(geometry: &Geometry, at: usize, more: [Leaf; 2]) -> Option<Arc<Geometry>> {
     let mut groups: Vec<Group> = geometry.groups.clone();
@@ -150,11 +158,20 @@ fn moved(geometry: &Geometry, path: u64, facet: &Facet, sign: f64) -> [DVec3; 3]
 /// Sends `rays` rays from points of facets with sheets, to both sides, within 60 degrees of the normal. A ray tunnels if
 /// it starts beyond its sheet, or meets neither the sheet nor anything before it. Points so near to their facet's edge
 /// that the ray may pass by the sheet are set aside.
-pub fn tunnelling(sheets: &Sheets, kernel: &dyn Intersectable, rays: u64, seed: u64) -> Tally {
+///
+/// Smooth shading lifts origins to the surface that its normals pretend, further than any bound: the promise is for rays
+/// that start at the true surface, which `lifted` asks to be otherwise.
+pub fn tunnelling(
+    sheets: &Sheets,
+    kernel: &dyn Intersectable,
+    lifted: bool,
+    rays: u64,
+    seed: u64,
+) -> Tally {
     if sheets.facets.is_empty() {
         return Tally::default();
     }
-    let of = |b: &mut Buffers, batch| run_batch(sheets, kernel, b, batch, seed);
+    let of = |b: &mut Buffers, batch| run_batch(sheets, kernel, b, lifted, batch, seed);
     in_batches(rays, of, Tally::merged)
 }
 
@@ -183,7 +200,10 @@ fn run_batch(sheets: &Sheets, kernel: &dyn Intersectable, b: &mut Buffers, batch
         else {
             continue;
         };
-        let vertex = vertex_at(&sheets.geometry, &ray, hit);
+        let mut vertex = vertex_at(&sheets.geometry, &ray, hit);
+        if !lifted {
+            vertex.lift = Vec3::ZERO;
+        }
         let spawned = leave(&vertex, outward, &mut random);
         match sheet_ahead(sheets, i, outward, &vertex, &spawned) {
             Ahead::At(t) => {
@@ -251,8 +271,16 @@ fn sheet_ahead(sheets: &Sheets, i: usize, outward: bool, v: &Vertex, spawned: &R
     // Well inside: a smaller triangle about the same middle.
     let middle = corners.iter().sum::<DVec3>() / 3.0;
     let smaller = corners.map(|c| middle + (c - middle) * 0.97);
-    match super::exact::crossing(local.o, local.d, smaller) {
-        Some(t) if t > 0.0 => Ahead::At(t),
-        _ => Ahead::Beside,
-    }
+    let crossing = super::exact::crossing(local.o, local.d, smaller).filter(|t| *t > 0.0);
+    let Some(t) = crossing else { return Ahead::Beside };
+    // What a kernel's transforms lose also moves the ray sideways.
+    let to_render = |p: DVec3| found.placement.as_ref().map_or(p, |pl| pl.to_render.transform_point3(p));
+    let (p, c) = (spawned.o.as_dvec3() + spawned.d.as_dvec3() * t, corners.map(to_render));
+    let sideways = 8.0 * f64::from(v.error.length());
+    let inside = (0..3).all(|k| {
+        let along = (c[(k + 1) % 3] - c[k]).normalize();
+        let w = p - c[k];
+        (w - along * along.dot(w)).length() > sideways
+    });
+    if inside { Ahead::At(t) } else { Ahead::Beside }
 }

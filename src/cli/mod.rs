@@ -3,6 +3,7 @@
 mod args;
 mod bench;
 mod crosscheck;
+mod check;
 mod info;
 mod interrupt;
 mod list;
@@ -73,6 +74,8 @@ enum Verb {
     Bench(Box<bench::BenchArgs>),
     /// Send every ray of a render through every kernel, judge the differences, and compare the pictures
     Crosscheck(Box<crosscheck::CrosscheckArgs>),
+    /// Certify that rays neither leak, nor meet what they left, nor jump over what is near, on every kernel
+    Check(Box<check::CheckArgs>),
     /// List every registered kind with its parameters
     List(list::ListArgs),
     /// Print the completions of a shell
@@ -117,6 +120,7 @@ fn run() -> Result<(), Failure> {
         Verb::Info(args) => info::run(args, &setting)?,
         Verb::Bench(args) => bench::run(args, &setting)?,
         Verb::Crosscheck(args) => crosscheck::run(args, &setting)?,
+        Verb::Check(args) => check::run(args, &setting)?,
         Verb::List(args) => list::run(args)?,
         Verb::Completions(args) => manual::completions(args)?,
         Verb::Man(args) => manual::man(args)?,

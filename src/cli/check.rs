@@ -1,0 +1,115 @@
+//! `skylit check`: a certificate of numerical stability for a scene or a mesh.
+
+use super::scene_args::SceneArgs;
+use super::{Setting, interrupt, print};
+use crate::accel;
+use crate::base::intersectable::KernelOptions;
+use crate::check::{CheckOptions, Watch, examine};
+use crate::error::{Error, Result, unknown_name};
+use crate::image::write::{check_file, write_file};
+use crate::report::machine::Machine;
+use clap::Args;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Flags of `skylit check`.
+#[derive(Args)]
+pub struct CheckArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Rays of each kind for each kernel, over all placements [default: 1000000]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000_000_000))]
+    rays: Option<u64>,
+    /// Kernels to check (see `skylit list backend`) [default: all]
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    backend: Vec<String>,
+    /// Seed of every random choice [default: 0]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Write the certificate as JSON, too
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write it as a page, too, placement by placement
+    #[arg(long, value_name = "FILE.html")]
+    html: Option<PathBuf>,
+}
+
+/// Runs the verb.
+///
+/// # Errors
+/// [`Error::Failed`] where a promise is broken, after everything has been written.
+pub fn run(args: &CheckArgs, setting: &Setting) -> Result<()> {
+    for path in [&args.json, &args.html].into_iter().flatten() {
+        check_file(path)?;
+    }
+    let known = || accel::KERNELS.iter().map(|k| k.name);
+    if let Some(name) = args.backend.iter().find(|n| known().all(|k| k != *n)) {
+        return Err(Error::Usage(unknown_name("backend", name, known())));
+    }
+    let usual = CheckOptions::default();
+    let options = CheckOptions {
+        rays: args.rays.unwrap_or(usual.rays),
+        seed: args.seed.unwrap_or(usual.seed),
+        kernels: args.backend.clone(),
+        kernel: KernelOptions { threads: setting.threads, ..usual.kernel },
+    };
+    let scene = args.scene.load()?;
+    let bar = Bar::new(setting.quiet);
+    let certificate = examine(&scene, &args.scene.input.display().to_string(), &options, &bar);
+    bar.0.finish_and_clear();
+    let certificate = certificate?;
+    let machine = Machine::here();
+    interrupt::hold_off(|| {
+        if let Some(path) = &args.json {
+            let record = Record { machine: &machine, verdict: certificate.verdict(), certificate: &certificate };
+            let text = serde_json::to_string_pretty(&record)
+                .map_err(|e| Error::Internal(format!("cannot write the certificate: {e}")))?;
+            write_file(path, (text + "\n").as_bytes())?;
+        }
+        match &args.html {
+            Some(path) => write_file(path, certificate.report(&machine).to_html()?.as_bytes()),
+            None => Ok(()),
+        }
+    })?;
+    print(certificate.to_text().as_bytes())?;
+    match certificate.broken().count() {
+        0 => Ok(()),
+        _ => Err(Error::Failed(certificate.verdict())),
+    }
+}
+
+/// What the JSON file holds.
+#[derive(Serialize)]
+struct Record<'a> {
+    machine: &'a Machine,
+    verdict: String,
+    #[serde(flatten)]
+    certificate: &'a crate::check::certificate::Certificate,
+}
+
+/// How far it is, on a terminal.
+struct Bar(ProgressBar);
+
+impl Bar {
+    fn new(quiet: bool) -> Self {
+        let target =
+            if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr_with_hz(8) };
+        Bar(ProgressBar::with_draw_target(None, target))
+    }
+}
+
+impl Watch for Bar {
+    fn begin(&self, steps: u64) {
+        if let Ok(style) = ProgressStyle::with_template("check {bar:32} {pos}/{len}  {msg}  {eta} left") {
+            self.0.set_style(style);
+        }
+        self.0.set_length(steps);
+    }
+
+    fn step(&self, what: &str) {
+        log::debug!("checking {what}");
+        self.0.inc(1);
+        self.0.set_message(what.to_owned());
+    }
+}
