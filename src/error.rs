@@ -6,9 +6,6 @@ use std::path::{Path, PathBuf};
 /// Every way a command can fail. The message says where, what, and what else was possible.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// A comparison, check or crosscheck failed: all ran well, and what was found is not as it should be. Exit code 1.
-    #[error("{0}")]
-    Failed(String),
     /// The command line or a parameter is wrong. Exit code 2.
     #[error("{0}")]
     Usage(String),

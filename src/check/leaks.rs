@@ -35,11 +35,7 @@ pub fn leaks(solid: &Solid, kernel: &dyn Intersectable, aim: Aim, rays: u64, see
     if solid.inside.is_empty() || rays == 0 {
         return Tally::default();
     }
-    in_batches(
-        rays,
-        |b: &mut Buffers, batch| run_batch(solid, kernel, aim, b, batch, seed),
-        |a, b| Tally::merged(a, b),
-    )
+    in_batches(rays, |b: &mut Buffers, batch| run_batch(solid, kernel, aim, b, batch, seed), Tally::merged)
 }
 
 #[derive(Default)]
@@ -169,7 +165,7 @@ fn has_passed(solid: &Solid, ray: &Ray, hit: &Hit, target: &Target) -> bool {
         let numbers = mesh.indices[face as usize].map(weld);
         let n = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
         let cosine = n.dot(d) / (n.length() * d.length());
-        if !(cosine.abs() >= GRAZING) || cosine * side < 0.0 {
+        if cosine.is_nan() || cosine.abs() < GRAZING || cosine * side < 0.0 {
             return false;
         }
         side = cosine;

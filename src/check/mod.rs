@@ -72,6 +72,14 @@ const MAX_LOOKED_AT: u64 = 10_000;
 /// sample: the oracle is simple enough to trust.
 const PLAIN_WORK: u64 = 200_000_000;
 
+/// The kinds of rays from inside.
+const AIMS: [(Check, Aim); 4] = [
+    (Check::LeaksAtRandom, Aim::Random),
+    (Check::LeaksAtVertices, Aim::Vertex),
+    (Check::LeaksAtEdges, Aim::Edge),
+    (Check::LeaksBeside, Aim::Beside),
+];
+
 /// A kernel under test.
 struct Tested {
     name: String,
@@ -216,14 +224,8 @@ impl Run<'_> {
         let meshes = mesh_paths(geometry);
         let solids: Vec<Solid> =
             meshes.iter().filter_map(|&path| Solid::new(geometry, path, target.seed)).collect();
-        let aims = [
-            (Check::LeaksAtRandom, Aim::Random),
-            (Check::LeaksAtVertices, Aim::Vertex),
-            (Check::LeaksAtEdges, Aim::Edge),
-            (Check::LeaksBeside, Aim::Beside),
-        ];
         for t in &kernels {
-            for (check, aim) in aims {
+            for (check, aim) in AIMS {
                 let each = t.rays.div_ceil(solids.len().max(1) as u64);
                 let of = |s: &Solid| leaks(s, &*t.kernel, aim, each, target.seed ^ check as u64);
                 let tally = solids.iter().map(of).fold(Default::default(), |a: tally::Tally, b| a.merged(&b));

@@ -84,8 +84,10 @@ impl Certificate {
     /// A line for each row, with a column for each kernel.
     pub fn table(&self, rows: &[Row]) -> Table {
         let kernels = self.kernels.iter().map(|k| {
-            Column::text(k.name.as_str()).help("failed of tried; where nothing failed, the share that could have \
-                 escaped at 95 %; the worst value; what that means")
+            Column::text(k.name.as_str()).help(
+                "failed of tried; where nothing failed, the share that could have \
+                 escaped at 95 %; the worst value; what that means",
+            )
         });
         let first = [Column::text("check"), Column::text("shape"), Column::text("placement")];
         let mut table = Table::new(first.into_iter().chain(kernels));
@@ -219,12 +221,5 @@ fn broken_line(row: &Row, e: &Entry) -> String {
 fn worst_line(row: &Row, e: &Entry) -> Option<String> {
     let worst = e.tally.worst?;
     let value = worst.value.map_or(String::new(), |v| format!(" {v:.4}"));
-    Some(format!(
-        "{}, {}, {}, {}{value}: {}",
-        e.kernel,
-        row.check.name(),
-        row.body,
-        row.placement,
-        worst.ray
-    ))
+    Some(format!("{}, {}, {}, {}{value}: {}", e.kernel, row.check.name(), row.body, row.placement, worst.ray))
 }

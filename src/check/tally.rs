@@ -65,8 +65,7 @@ impl Tally {
     #[inline]
     pub fn measure(&mut self, value: f64, limit: f64, ray: &Ray, order: u64) {
         self.tried += 1;
-        // NaN fails.
-        self.failed += u64::from(!(value <= limit));
+        self.failed += u64::from(value > limit || value.is_nan());
         let value = if value.is_nan() { f64::INFINITY } else { value };
         if self.worst.is_none_or(|w| w.value.is_some_and(|v| value > v)) {
             self.offer(Worst { value: Some(value), ray: ray.into(), order });

@@ -1,6 +1,7 @@
 //! That what is wrong is found, and what is right is not accused.
 
 use super::bodies::{Body, needles};
+use super::certificate::{Certificate, Check, Standing};
 use super::leaks::{Aim, leaks};
 use super::quadrics::{BODIES, quadrics};
 use super::solid::Solid;
@@ -185,68 +186,55 @@ fn sheets_are_met_and_one_that_is_left_out_is_missed() {
     let geometry = rock();
     let sheets = Sheets::new(&geometry, 0, 1).unwrap().expect("a mesh at the root");
     let oracle = Brute::new(sheets.geometry.clone());
-    let t = tunnelling(&sheets, &oracle, 2000, 5);
+    let t = tunnelling(&sheets, &oracle, false, 2000, 5);
     assert!(t.failed == 0 && t.tried > 1000, "{t:?}");
     let blind = Bent(Brute::new(sheets.geometry.clone()), |b: &Brute, ray: &Ray| {
         b.intersect(&Ray { tnear: 1e-6, ..*ray })
     });
-    let t = tunnelling(&sheets, &blind, 2000, 5);
+    // Smooth shading lifts them over the outer sheets, which is told and not promised.
+    let lifted = tunnelling(&sheets, &oracle, true, 2000, 5);
+    assert!(sheets.is_smooth() && lifted.failed > 0, "{lifted:?}");
+    let t = tunnelling(&sheets, &blind, false, 2000, 5);
     assert!(t.failed > 500, "{t:?}");
 }
 
 /// Every kernel, every placement: nothing that is promised breaks. Few rays: `skylit check` sends more.
 #[test]
 fn promises_hold_over_the_sweep() {
-    let bodies =
-        [Body { name: "rock".into(), node: node("displaced_sphere", &[("triangles", 2000.0)]) }, needles()];
-    for body in &bodies {
-        for placement in placements() {
-            let geometry = placement.build(&body.node).expect("builds");
-            let solid = Solid::new(&geometry, mesh_path(&geometry), 1).unwrap();
-            let sheets = Sheets::new(&geometry, mesh_path(&geometry), 1).unwrap();
-            for (name, kernel) in kernels(&geometry) {
-                let rays = if name == "brute" { 100 } else { 20_000 };
-                let what = format!("{name}, {}, {}", body.name, placement.name);
-                let s = spawned(&geometry, &*kernel, rays, 6);
-                println!(
-                    "{what}: offset {:?} point {:?} t {:?} neigh {}",
-                    s.offset.worst.map(|w| w.value),
-                    s.point.worst.map(|w| w.value),
-                    s.distance.worst.map(|w| w.value),
-                    s.neighbours.failed
-                );
-                for aim in [Aim::Random, Aim::Vertex, Aim::Edge, Aim::Beside] {
-                    let l = leaks(&solid, &*kernel, aim, rays, 7);
-                    println!(
-                        "   {aim:?} {} of {}, {} aside, points {}",
-                        l.failed,
-                        l.tried,
-                        l.aside,
-                        solid.inside.len()
-                    );
-                    if name == "brute" {
-                        assert_eq!(l.failed, 0, "{what}: {aim:?} {l:?}");
-                    }
-                }
-                if s.self_hits.failed + s.distance.failed + s.offset.failed + s.point.failed > 0 {
-                    println!("  FAIL {s:?}");
-                }
-            }
-            let Some(sheets) = sheets else { continue };
-            for (name, kernel) in kernels(&sheets.geometry) {
-                let rays = if name == "brute" { 100 } else { 20_000 };
-                let t = tunnelling(&sheets, &*kernel, rays, 8);
-                println!(
-                    "{name} {} {}: tunnel {} of {} aside {}",
-                    body.name, placement.name, t.failed, t.tried, t.aside
-                );
+    let rock = Body { name: "rock".into(), node: node("displaced_sphere", &[("triangles", 2000.0)]) };
+    let mut certificate = Certificate::default();
+    let bodies = [rock, needles()];
+    for (body, placement) in bodies.iter().flat_map(|b| placements().into_iter().map(move |p| (b, p))) {
+        let geometry = placement.build(&body.node).expect("builds");
+        let names = [body.name.as_str(), placement.name.as_str()];
+        let path = super::mesh_paths(&geometry)[0];
+        let solid = Solid::new(&geometry, path, 1).unwrap();
+        for (name, kernel) in kernels(&geometry) {
+            let rays = if name == "brute" { 100 } else { 5000 };
+            let s = spawned(&geometry, &*kernel, rays, 6);
+            certificate.add(Check::SelfHits, names, name, s.self_hits);
+            certificate.add(Check::Offset, names, name, s.offset);
+            certificate.add(Check::Point, names, name, s.point);
+            certificate.add(Check::Distance, names, name, s.distance);
+            for (check, aim) in super::AIMS {
+                let tally = leaks(&solid, &*kernel, aim, rays, 7);
+                certificate.add(check, names, name, tally);
+                // What Embree's robust mode leaks at vertices, and no more: 1.2 to 1.8 % of a sphere, 4 % of a rock
+                // flattened to 1:1000.
+                assert!(tally.failed * 12 <= tally.tried, "{names:?} {name} {aim:?}: {tally:?}");
             }
         }
+        let Some(sheets) = Sheets::new(&geometry, path, 1).unwrap() else { continue };
+        for (name, kernel) in kernels(&sheets.geometry) {
+            let rays = if name == "brute" { 100 } else { 5000 };
+            certificate.add(Check::Tunnelling, names, name, tunnelling(&sheets, &*kernel, false, rays, 8));
+        }
     }
-}
-
-fn mesh_path(geometry: &Geometry) -> u64 {
-    super::mesh_paths(geometry)[0]
+    let broken: Vec<_> = certificate.broken().collect();
+    assert!(broken.is_empty(), "{}\n{broken:#?}", certificate.verdict());
+    let untried =
+        certificate.rows.iter().flat_map(|r| &r.entries).filter(|e| e.standing == Standing::Untried);
+    assert!(untried.count() < 10, "almost everything can be tried");
 }
 
 #[test]
@@ -257,13 +245,11 @@ fn quadrics_are_right_from_afar() {
             for distance in [1.0, 1e3, 1e6] {
                 let q = quadrics(body, &geometry, &*kernel, distance, 5000, 9);
                 let what = format!("{name}, {}, {distance:e}", body.name);
-                println!(
-                    "{what}: {:?} {:?} {:?} {:?}",
-                    q.decision,
-                    q.ulp.worst.map(|w| w.value),
-                    q.point.worst.map(|w| w.value),
-                    (q.self_hits.failed, q.self_hits.tried, q.self_hits.aside)
-                );
+                assert!(q.decision.failed == 0 && q.decision.tried > 3000, "{what}: {:?}", q.decision);
+                for t in [q.ulp, q.point, q.self_hits] {
+                    assert_eq!(t.failed, 0, "{what}: {t:?}");
+                }
+                assert_eq!(q.ulp.tried > 0, body.name == "sphere");
             }
         }
     }

@@ -161,13 +161,7 @@ fn moved(geometry: &Geometry, path: u64, facet: &Facet, sign: f64) -> [DVec3; 3]
 ///
 /// Smooth shading lifts origins to the surface that its normals pretend, further than any bound: the promise is for rays
 /// that start at the true surface, which `lifted` asks to be otherwise.
-pub fn tunnelling(
-    sheets: &Sheets,
-    kernel: &dyn Intersectable,
-    lifted: bool,
-    rays: u64,
-    seed: u64,
-) -> Tally {
+pub fn tunnelling(sheets: &Sheets, kernel: &dyn Intersectable, lifted: bool, rays: u64, seed: u64) -> Tally {
     if sheets.facets.is_empty() {
         return Tally::default();
     }
@@ -183,7 +177,14 @@ struct Buffers {
     orders: Vec<u64>,
 }
 
-fn run_batch(sheets: &Sheets, kernel: &dyn Intersectable, b: &mut Buffers, batch: Batch, seed: u64) -> Tally {
+fn run_batch(
+    sheets: &Sheets,
+    kernel: &dyn Intersectable,
+    b: &mut Buffers,
+    lifted: bool,
+    batch: Batch,
+    seed: u64,
+) -> Tally {
     let mut random = Stream::new(seed, batch.number);
     let mut tally = Tally::default();
     b.rays.clear();

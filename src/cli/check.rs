@@ -62,7 +62,8 @@ pub fn run(args: &CheckArgs, setting: &Setting) -> Result<()> {
     let machine = Machine::here();
     interrupt::hold_off(|| {
         if let Some(path) = &args.json {
-            let record = Record { machine: &machine, verdict: certificate.verdict(), certificate: &certificate };
+            let record =
+                Record { machine: &machine, verdict: certificate.verdict(), certificate: &certificate };
             let text = serde_json::to_string_pretty(&record)
                 .map_err(|e| Error::Internal(format!("cannot write the certificate: {e}")))?;
             write_file(path, (text + "\n").as_bytes())?;
@@ -93,8 +94,7 @@ struct Bar(ProgressBar);
 
 impl Bar {
     fn new(quiet: bool) -> Self {
-        let target =
-            if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr_with_hz(8) };
+        let target = if quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr_with_hz(8) };
         Bar(ProgressBar::with_draw_target(None, target))
     }
 }
