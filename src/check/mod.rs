@@ -70,7 +70,7 @@ const MAX_LOOKED_AT: u64 = 10_000;
 
 /// Tests of primitives that a kernel without any structure (the oracle) may spend on each kind of ray. It stays a
 /// sample: the oracle is simple enough to trust.
-const PLAIN_WORK: u64 = 200_000_000;
+const PLAIN_WORK: u64 = 50_000_000;
 
 /// The kinds of rays from inside.
 const AIMS: [(Check, Aim); 4] = [
@@ -280,7 +280,9 @@ impl Run<'_> {
                         (Check::QuadricPoint, q.point),
                         (Check::QuadricSelfHits, q.self_hits),
                     ] {
-                        self.certificate.add(check, [body.name, &placement], &t.name, tally);
+                        if check != Check::SphereUlp || body.is_sphere() {
+                            self.certificate.add(check, [body.name, &placement], &t.name, tally);
+                        }
                     }
                     t.kernel.take_failure()?;
                 }

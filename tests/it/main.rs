@@ -1,5 +1,6 @@
 //! The one integration-test binary: a module a subject.
 
+mod bad_geometry;
 mod cli;
 mod common;
 mod crosscheck;

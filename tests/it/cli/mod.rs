@@ -19,6 +19,7 @@ fn usage_is_told_on_the_right_stream() {
     assert_eq!((help.code, help.stderr.as_str()), (0, ""));
     for verb in ["render", "info", "bench", "list", "completions", "man"] {
     for verb in ["render", "info", "crosscheck", "list", "completions", "man"] {
+    for verb in ["render", "info", "check", "list", "completions", "man"] {
         assert!(help.stdout.contains(verb));
         assert!(f.run(&format!("{verb} --help")).succeeds().stdout.contains("--threads"));
     }
@@ -98,6 +99,29 @@ fn info_tells_what_is_there() {
     let max = f.json("i.json")["bounds"]["max"].clone();
     assert_eq!(max, serde_json::json!([1.0, 1.0, 1.0]));
     f.run("info tri.ply --sky gradient").succeeds();
+}
+
+#[test]
+fn a_check_certifies_in_three_forms() {
+    let f = Folder::new();
+    let check = "check tri.ply --rays 300 --json c.json --html c.html";
+    let run = f.run(check).succeeds();
+    for word in ["open, 1 hole", "hole of 4 edges", "self-hits", "tunnelling", "verdict: all "] {
+        assert!(run.stdout.contains(word), "{word} in {}", run.stdout);
+    }
+    let c = f.json("c.json");
+    assert_eq!(c["meshes"][0]["topology"]["boundary_edges"], 4);
+    assert_eq!(c["meshes"][0]["closed"], false);
+    let kept = |e: &serde_json::Value| e["standing"] != "broken" && e["tried"].is_u64();
+    assert!(c["rows"].as_array().unwrap().iter().all(|r| r["entries"].as_array().unwrap().iter().all(kept)));
+    assert!(std::fs::read_to_string(f.path().join("c.html")).unwrap().contains("Placement by placement"));
+    // The same counts again, from another number of threads.
+    f.run("check tri.ply --rays 300 --json d.json --quiet --threads 1").succeeds();
+    assert_eq!(f.json("d.json")["rows"], c["rows"]);
+    f.refuses("check tri.ply --backend embre", 2, &["unknown backend", "brute"]);
+    f.refuses("check tri.ply --rays 0", 2, &["--rays"]);
+    f.refuses("check tri.ply --json none/c.json", 3, &["none"]);
+    f.run("check scene.toml --rays 100 --backend brute").succeeds();
 }
 
 #[test]
