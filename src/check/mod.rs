@@ -24,7 +24,7 @@ pub mod tunnel;
 use crate::accel::{KERNELS, build_kernel};
 use crate::base::geometry::Geometry;
 use crate::base::intersectable::{Intersectable, KernelOptions};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::sampler::hash::mix64;
 use crate::scene::build::{BuildOptions, build};
 use crate::scene::desc::SceneDesc;
@@ -98,7 +98,7 @@ struct Target<'a> {
 /// Examines a scene: all of its shapes in all placements, the scene as it is, and quadrics from afar.
 ///
 /// # Errors
-/// What the scene builder says of the scene as it is, or [`build_kernel`] of a kernel's name. Placements that cannot
+/// [`Error::Usage`] for a scene without objects, what the scene builder says of the scene as it is, or [`build_kernel`] of a kernel's name. Placements that cannot
 /// be built are noted.
 pub fn examine(
     scene: &SceneDesc,
@@ -107,7 +107,12 @@ pub fn examine(
     watch: &dyn Watch,
 ) -> Result<Certificate> {
     let plain = BuildOptions { backend: "brute".into(), kernel: options.kernel };
-    let whole = build(scene.clone(), &plain)?;
+    if scene.objects.is_empty() {
+        return Err(Error::Usage("there is nothing to check: the scene has no object".into()));
+    }
+    // No ray asks for light.
+    let unlit = SceneDesc { sky: None, lights: Vec::new(), ..scene.clone() };
+    let whole = build(unlit, &plain)?;
     let mut found = bodies::of_scene(scene);
     let users = found.list.len();
     found.list.push(bodies::needles());
@@ -192,7 +197,7 @@ impl Run<'_> {
         for name in wanted {
             let kernel = match build_kernel(&name, target.geometry.clone(), &self.options.kernel) {
                 Ok(kernel) => kernel,
-                Err(e @ crate::error::Error::Usage(_)) => return Err(e),
+                Err(e @ Error::Usage(_)) => return Err(e),
                 Err(e) => {
                     let (body, placement) = (target.body, target.placement);
                     self.certificate.notes.push(format!("{name} cannot hold {body}, {placement}: {e}"));

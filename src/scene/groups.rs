@@ -15,6 +15,9 @@ use std::sync::Arc;
 /// Deepest nesting of groups that is accepted.
 pub const MAX_NESTING: usize = 64;
 
+/// The largest coordinate of any group in world units: the square of a length must not overflow.
+const LARGEST: f64 = 1e150;
+
 /// All groups, children before parents, the root last.
 pub struct GroupPlan<'a> {
     /// See above.
@@ -238,9 +241,11 @@ impl<'a> Planner<'a> {
         children: Vec<PlannedChild>,
         bounds: DAabb,
     ) -> Result<usize> {
-        if !bounds.is_empty() && !(bounds.max - bounds.min).is_finite() {
+        if !bounds.is_empty() && !bounds.min.abs().max(bounds.max.abs()).cmple(DVec3::splat(LARGEST)).all() {
             let place = shapes.first().map_or(Place::default(), |s| s.object.place.clone());
-            return Err(at(&place, "the objects are too large: their bounds exceed double precision"));
+            let message =
+                format!("the objects are too large or too far away: coordinates go up to {LARGEST:e}");
+            return Err(at(&place, message));
         }
         let to_local = local_space(&bounds);
         self.groups.push(PlannedGroup { shapes, children, to_local, bounds });
