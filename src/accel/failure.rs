@@ -45,4 +45,3 @@ fn panic_text(panic: &(dyn Any + Send)) -> String {
     let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
     format!("panic in a shape or hit filter: {}", text.unwrap_or("(no message)"))
 }
-

@@ -1,5 +1,7 @@
 //! L2: ray kernels. One file (or folder) a kernel, and one row in [`KERNELS`].
 
+#[cfg(all(feature = "bvh", feature = "embree"))]
+mod auto;
 pub mod brute;
 #[cfg(feature = "bvh")]
 pub mod bvh;
@@ -36,18 +38,18 @@ pub struct KernelRow {
     pub build: BuildKernel,
 }
 
-/// All kernels of this build; `auto` is the first.
+/// All kernels of this build. Where there is no choice to make, `auto` is the first.
 pub const KERNELS: &[KernelRow] = &[
-    #[cfg(feature = "embree")]
-    embree::ROW,
     #[cfg(feature = "bvh")]
     bvh::ROW,
+    #[cfg(feature = "embree")]
+    embree::ROW,
     #[cfg(feature = "bvh")]
     obvhs::ROW,
     brute::ROW,
 ];
 
-/// Builds the kernel of this name; "auto" is the fastest there is. Errors for an unknown name, and where the kernel
+/// Builds the kernel of this name; "auto" is the in-house one, unless Embree is found to be faster. Errors for an unknown name, and where the kernel
 /// cannot hold the geometry.
 pub fn build_kernel(
     name: &str,
@@ -56,6 +58,10 @@ pub fn build_kernel(
 ) -> Result<Box<dyn Intersectable>> {
     if geometry.groups.is_empty() {
         return Err(Error::Internal("a geometry without its root group".to_owned()));
+    }
+    #[cfg(all(feature = "bvh", feature = "embree"))]
+    if name == "auto" {
+        return auto::build(geometry, o);
     }
     let row = KERNELS.iter().find(|k| k.name == name).or_else(|| KERNELS.first().filter(|_| name == "auto"));
     let known = ["auto"].into_iter().chain(KERNELS.iter().map(|k| k.name));

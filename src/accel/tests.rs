@@ -340,7 +340,7 @@ fn options_change_no_answer() {
     let rays = rays(&mut TestRng::new(7), 100, 8.0, 3.0);
     for quality in [BuildQuality::Fast, BuildQuality::Balanced, BuildQuality::Best] {
         for mode in [KernelMode::Robust, KernelMode::Fast] {
-            let options = KernelOptions { quality, mode, threads: 1, simd: None };
+            let options = KernelOptions { quality, mode, threads: 1, ..KernelOptions::default() };
             let kernel = build_kernel("auto", geometry.clone(), &options).expect("builds");
             rays.iter().for_each(|r| check(&brute, r, kernel.intersect(r), &format!("{options:?}")));
         }

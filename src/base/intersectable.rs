@@ -112,4 +112,6 @@ pub struct KernelOptions {
     /// The instruction set of hand-written kernels; none means [`Level::chosen`]. Changes no answer of these. Kernels of
     /// a library take it as a limit, if they can, and then say so in [`Intersectable::describe`].
     pub simd: Option<Level>,
+    /// How many rays will be asked for, roughly; 0 where that is not known. Changes no answer.
+    pub expected_rays: u64,
 }

@@ -2,8 +2,8 @@
 
 mod args;
 mod bench;
-mod crosscheck;
 mod check;
+mod crosscheck;
 mod info;
 mod interrupt;
 mod list;

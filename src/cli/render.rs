@@ -118,7 +118,8 @@ pub fn run(args: &RenderArgs, setting: &Setting) -> Result<()> {
     if desc.objects.is_empty() {
         log::warn!("the scene has no object: only the sky can be seen");
     }
-    let scene = build_scene(desc, &args.kernel.options(setting.threads))?;
+    let options = args.kernel.options(setting.threads, expected_rays(&renderer.settings));
+    let scene = build_scene(desc, &options)?;
     log::info!("{} threads, {}", setting.threads, scene.kernel.describe());
     let bar = Bar::new(setting.quiet, renderer.settings.time);
     let rendered = renderer.render(&scene, &bar);
@@ -227,8 +228,20 @@ fn named(kind: &str) -> Node {
     Node { kind: kind.to_owned(), ..Node::default() }
 }
 
+/// Rays of a render, roughly: with a limit of time, those of a million samples a second and thread.
+fn expected_rays(s: &RenderSettings) -> u64 {
+    /// A camera ray, a shadow ray, and a bounce where something is hit.
+    const RAYS_A_SAMPLE: u64 = 2;
+    let samples = s.crop.area() as u64 * u64::from(s.spp);
+    let samples = match s.time {
+        Some(time) => samples.min((time.as_secs_f64() * 1e6) as u64 * s.threads as u64),
+        None => samples,
+    };
+    samples.saturating_mul(RAYS_A_SAMPLE)
+}
+
 impl KernelArgs {
-    fn options(&self, threads: usize) -> BuildOptions {
+    fn options(&self, threads: usize, expected_rays: u64) -> BuildOptions {
         let quality = match self.build {
             Some(QualityArg::Fast) => BuildQuality::Fast,
             Some(QualityArg::Best) => BuildQuality::Best,
@@ -236,6 +249,6 @@ impl KernelArgs {
         };
         let mode = self.kernel_mode.map_or(KernelMode::Robust, KernelMode::from);
         let backend = self.backend.clone().unwrap_or_else(|| "auto".into());
-        BuildOptions { backend, kernel: KernelOptions { quality, mode, threads, simd: None } }
+        BuildOptions { backend, kernel: KernelOptions { quality, mode, threads, simd: None, expected_rays } }
     }
 }

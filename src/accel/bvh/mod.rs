@@ -239,10 +239,10 @@ impl Intersectable for Kernel {
 
     fn describe(&self) -> String {
         let mode = match self.mode {
-            KernelMode::Robust => "",
-            KernelMode::Fast => " fast",
+            KernelMode::Robust => "robust",
+            KernelMode::Fast => "fast",
         };
-        format!("bvh {}{mode}", self.level.level().name())
+        format!("bvh {} {mode}", self.level.level().name())
     }
 
     fn take_failure(&self) -> Result<()> {

@@ -114,7 +114,13 @@ impl Choice {
             let mut names = HashSet::new();
             for &mode in &self.modes {
                 for &simd in &levels {
-                    let options = KernelOptions { mode, simd, quality: self.quality, threads: self.threads };
+                    let options = KernelOptions {
+                        mode,
+                        simd,
+                        quality: self.quality,
+                        threads: self.threads,
+                        ..KernelOptions::default()
+                    };
                     let probe = accel::build_kernel(backend, nothing.clone(), &options)?;
                     if names.insert(probe.describe()) {
                         all.push(Variant { backend, options });
