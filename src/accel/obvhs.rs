@@ -1,11 +1,11 @@
 //! The library's own tree of two children and its own traversal, as a baseline: what the in-house kernel is measured against.
 //!
 //! One tree a group; a placed group is a primitive of its parent's tree, whose rays are taken into it in double precision.
-//! Triangles are decided by the test of all kernels ([`crate::math::triangle`]); that boxes are tested in single precision
-//! without bounds is the library's, and where leaks come from.
+//! Triangles are decided by the test of all kernels ([`crate::math::triangle`]). The library tests boxes in single precision
+//! without bounds, so boxes are padded, and rays from afar begin nearer.
 
 use super::failure::Failure;
-use super::tame::{Tame, check_extent, grown, reach};
+use super::tame::{Tame, check_extent, extent, grown};
 use super::{KernelRow, accepted, first_crossing};
 use crate::base::geometry::{Geometry, Group};
 use crate::base::hit::Hit;
@@ -162,18 +162,22 @@ impl Search {
 }
 
 fn tree(geometry: &Geometry, group: &Group, options: &KernelOptions) -> Option<Tree> {
+    let size = extent(&group.bounds.into());
+    // The library's test is off by some four roundings of the way from the ray's origin, at most `NEAR` sizes of the
+    // group away, to a plane.
+    let pad = (size * (NEAR + 1.0) * 4.0 * f64::from(f32::EPSILON)) as f32;
     let mut boxes = Vec::new();
     let mut primitives = Vec::new();
     for (i, leaf) in group.leaves.iter().enumerate() {
         for prim in 0..leaf.shape.primitive_count() {
-            boxes.push(box3(&leaf.shape.primitive_bounds(prim)));
+            boxes.push(box3(&leaf.shape.primitive_bounds(prim), pad));
             primitives.push(Primitive::Leaf { leaf: i as u32, prim });
         }
     }
     for (i, child) in group.children.iter().enumerate() {
         let inner = &geometry.groups[child.group];
         if !inner.bounds.is_empty() {
-            boxes.push(box3(&grown(inner.bounds).transformed(&child.to_parent).to_f32()));
+            boxes.push(box3(&grown(inner.bounds).transformed(&child.to_parent).to_f32(), pad));
             primitives.push(Primitive::Child(i as u32));
         }
     }
@@ -189,13 +193,14 @@ fn tree(geometry: &Geometry, group: &Group, options: &KernelOptions) -> Option<T
     let params = BvhBuildParams { pre_split: false, ..params };
     let bvh = build_bvh2(&boxes, params, &mut Duration::default());
     let primitives = bvh.primitive_indices.iter().map(|&i| primitives[i as usize]).collect();
-    let reach = reach(group.bounds);
-    Some(Tree { bvh, primitives, grown: grown(group.bounds), reach })
+    Some(Tree { bvh, primitives, grown: grown(group.bounds), reach: NEAR * size })
 }
 
-fn box3(b: &Aabb) -> Box3 {
-    let corner = |v: Vec3| Vec3A::from(v);
-    Box3 { min: corner(b.min), max: corner(b.max) }
+/// How many sizes of a group from its origin a ray may start to be traced as it is.
+const NEAR: f64 = 4.0;
+
+fn box3(b: &Aabb, pad: f32) -> Box3 {
+    Box3 { min: Vec3A::from(b.min - Vec3::splat(pad)), max: Vec3A::from(b.max + Vec3::splat(pad)) }
 }
 
 impl Intersectable for Kernel {

@@ -37,6 +37,12 @@ pub trait Intersectable: Send + Sync {
         None
     }
 
+    /// What the surface area heuristic expects of a line through the kernel's bounds that nothing stops: inner nodes,
+    /// leaves and primitives visited; none where the kernel cannot say. Instances count as one primitive.
+    fn predicted_visits(&self) -> Option<[f64; 3]> {
+        None
+    }
+
     /// Bytes that the acceleration structure holds beyond the geometry it was given.
     fn memory(&self) -> u64;
 

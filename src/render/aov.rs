@@ -1,6 +1,8 @@
 //! Layers beside the picture, read from the first surface of each path.
 
 use super::film_layers;
+use crate::base::intersectable::QueryKind;
+use crate::base::ray::Ray;
 use crate::error::{Error, Result, unknown_name};
 use crate::integrators::FirstHit;
 use crate::scene::Scene;
@@ -77,6 +79,20 @@ pub static REGISTRY: &[AovRow] = &[
         full_precision: true,
         combine: Combine::First,
         eval: |h, _| [h.vertex.object as f32 + 1.0, 0.0, 0.0, 0.0],
+    },
+    AovRow {
+        name: "visits",
+        doc: "nodes, leaves and primitives that the kernel visits for the camera ray; 0 where it does not count",
+        channels: &["nodes", "leaves", "primitives"],
+        full_precision: true,
+        combine: Combine::Mean,
+        eval: |h, scene| {
+            let v = &h.vertex;
+            // The camera ray again, from its end: for a count, roundings do not matter.
+            let ray = Ray::new(v.p + v.wo * v.t, -v.wo, 0);
+            let n = scene.kernel.visits(&ray, QueryKind::Closest).unwrap_or_default();
+            [n.nodes as f32, n.leaves as f32, n.primitives as f32, 0.0]
+        },
     },
 ];
 

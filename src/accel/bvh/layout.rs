@@ -288,6 +288,34 @@ impl Tree {
         self.owners.get(block).map_or(self.only_mesh, |o| o[lane % LANES])
     }
 
+    /// Inner nodes, leaves and primitives that a line through the bounds visits on average: each box is met by as many
+    /// lines as it has surface (MacDonald and Booth, "Heuristics for Ray Tracing Using Space Subdivision", 1990).
+    pub(super) fn predicted_visits(&self) -> [f64; 3] {
+        let area = |b: &Aabb| f64::from(b.surface_area());
+        let whole = area(&self.bounds);
+        let part = |b: &Aabb| if whole > 0.0 { area(b) / whole } else { 1.0 };
+        let mut sum = [0.0; 3];
+        let mut add = |child: Child, part: f64| match child.target() {
+            Target::Node(_) => sum[0] += part,
+            leaf => {
+                let primitives = match leaf {
+                    Target::Block(i) => self.blocks()[i].count(),
+                    Target::Shapes(_, n) => n as u64,
+                    _ => 1,
+                };
+                sum[1] += part;
+                sum[2] += part * primitives as f64;
+            }
+        };
+        self.root.iter().for_each(|c| add(*c, 1.0));
+        for node in &self.nodes()[..self.node_count] {
+            for (lane, &child) in node.children.0.iter().enumerate().filter(|(_, c)| **c != Child::NONE) {
+                add(child, part(&node.bounds(lane)));
+            }
+        }
+        sum
+    }
+
     /// Bytes of all arrays.
     pub(super) fn memory(&self) -> u64 {
         let rest =

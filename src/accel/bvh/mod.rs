@@ -233,6 +233,10 @@ impl Intersectable for Kernel {
         Some(count)
     }
 
+    fn predicted_visits(&self) -> Option<[f64; 3]> {
+        Some(self.trees[self.root()].predicted_visits())
+    }
+
     fn memory(&self) -> u64 {
         self.trees.iter().map(Tree::memory).sum()
     }

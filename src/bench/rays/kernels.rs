@@ -61,6 +61,9 @@ pub struct KernelInfo {
     pub builds: u32,
     /// Bytes held beyond the geometry.
     pub memory: u64,
+    /// Nodes, leaves and primitives that the surface area heuristic expects of a line that nothing stops, if it counts.
+    #[serde(default)]
+    pub predicted: Option<[f64; 3]>,
 }
 
 /// A kernel that was built.
@@ -195,6 +198,7 @@ impl Built {
             build_seconds,
             builds: 1,
             memory: kernel.memory(),
+            predicted: kernel.predicted_visits(),
         };
         Ok(Built {
             kernel,

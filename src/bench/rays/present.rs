@@ -104,8 +104,14 @@ pub fn visits_table(r: &Record) -> Table {
         Column::number("leaves").help("leaves opened, per ray"),
         Column::number("primitives").help("primitives tested, per ray"),
     ]);
+    let number = |x: f64| Cell::number(x, format!("{x:.2}"));
+    for (k, kernel) in r.kernels.iter().enumerate() {
+        if let Some([nodes, leaves, primitives]) = kernel.predicted {
+            let what = Cell::from("predicted: lines that nothing stops");
+            table.push([Cell::from(r.kernel_label(k)), what, number(nodes), number(leaves), number(primitives)]);
+        }
+    }
     for v in &r.visits {
-        let number = |x: f64| Cell::number(x, format!("{x:.2}"));
         let name = r.workloads[v.workload].name.as_str();
         table.push([
             Cell::from(r.kernel_label(v.kernel)),

@@ -313,6 +313,7 @@ fn made_up(speeds: &[f64]) -> Record {
         build_seconds: 1.0,
         builds: 1,
         memory: 1,
+        predicted: None,
     };
     let seconds = speeds.iter().map(|s| 1.0 / s).collect();
     let cell = Cell::new(1_000_000, seconds);
