@@ -67,10 +67,13 @@ impl Kernel {
         let (Some(tree), g) = (&self.trees[group], &self.geometry.groups[group]) else { return };
         let exact = from_render.map_or(search.ray, |m| search.ray.transformed(m));
         let Some(tame) = Tame::new(&exact, &tree.grown, tree.reach) else { return };
-        let (o, d) = (tame.ray.o.as_vec3a(), tame.ray.d.as_vec3a());
-        let local = |t: f64| ((t - tame.shift) / tame.scale) as f32;
+        // The library takes components of the direction below 1.2e-7 for that, so the largest has to be about 1.
+        let length = tame.ray.d.abs().max_element();
+        let (o, d) = (tame.ray.o.as_vec3a(), (tame.ray.d / length).as_vec3a());
+        let local = |t: f64| ((t - tame.shift) / tame.scale * length) as f32;
         let any = search.any;
-        let ray = obvhs::ray::Ray::new(o, d, tame.ray.tnear as f32, local(search.ray.tfar).next_up());
+        let ray =
+            obvhs::ray::Ray::new(o, d, (tame.ray.tnear * length) as f32, local(search.ray.tfar).next_up());
         let test = TriangleRay::new(exact.o, exact.d);
         let mut visit = |i: usize| match tree.primitives[i] {
             Primitive::Leaf { leaf, prim } => {

@@ -108,7 +108,13 @@ pub fn visits_table(r: &Record) -> Table {
     for (k, kernel) in r.kernels.iter().enumerate() {
         if let Some([nodes, leaves, primitives]) = kernel.predicted {
             let what = Cell::from("predicted: lines that nothing stops");
-            table.push([Cell::from(r.kernel_label(k)), what, number(nodes), number(leaves), number(primitives)]);
+            table.push([
+                Cell::from(r.kernel_label(k)),
+                what,
+                number(nodes),
+                number(leaves),
+                number(primitives),
+            ]);
         }
     }
     for v in &r.visits {
