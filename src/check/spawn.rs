@@ -9,7 +9,8 @@ use crate::base::geometry::Geometry;
 use crate::base::hit::HitBatch;
 use crate::base::intersectable::Intersectable;
 use crate::base::ray::{Coherence, Ray, RayBatch};
-use crate::base::vertex::Vertex;
+use crate::base::shape::LocalRay;
+use crate::base::vertex::{Vertex, local_ray};
 use glam::Vec3;
 
 /// What is counted of rays that arrive and leave.
@@ -117,6 +118,15 @@ fn leaving_direction(v: &Vertex, geometry: &Geometry, random: &mut Stream) -> Ve
     if curved && w.dot(v.ng).abs() < 0.05 { (w + v.ng * 0.1).normalize() } else { w }
 }
 
+/// Whether a ray leaves a convex shape's surface inwards and starts inside, so that it rightly meets the far side, however
+/// near that is: what lies behind the origin tells.
+fn crosses_inside(geometry: &Geometry, v: &Vertex, ray: &Ray) -> bool {
+    let found = geometry.resolve(v.path);
+    let local = local_ray(ray, found.placement.as_ref());
+    let back = LocalRay { d: -local.d, ..local };
+    ray.d.dot(v.ng) < 0.0 && found.leaf.shape.intersect(&back, v.prim).is_some()
+}
+
 /// Eight times as far along a spawned ray as its origin lies from the surface.
 fn near(v: &Vertex, spawned: &Ray) -> f64 {
     let cosine = f64::from(spawned.d.dot(v.ng).abs()).max(1e-3);
@@ -144,7 +154,10 @@ type Found = (Option<crate::base::hit::Hit>, bool);
 fn left(t: &mut SpawnTallies, geometry: &Geometry, v: &Vertex, ray: &Ray, (hit, blocked): Found, order: u64) {
     let flat = geometry.resolve(v.path).leaf.shape.triangles().is_some();
     let near = near(v, ray);
-    let same = hit.is_some_and(|h| (h.path, h.prim) == (v.path, v.prim) && (flat || f64::from(h.t) <= near));
+    let same = hit.is_some_and(|h| {
+        let met = (h.path, h.prim) == (v.path, v.prim);
+        met && (flat || (f64::from(h.t) <= near && !crosses_inside(geometry, v, ray)))
+    });
     // Blocked at once, where the closest thing is far: by the surface itself, then.
     let only_any = blocked && hit.is_none_or(|h| f64::from(h.t) > 1.001 * near);
     t.self_hits.count(same || only_any, ray, order);

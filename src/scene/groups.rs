@@ -15,8 +15,9 @@ use std::sync::Arc;
 /// Deepest nesting of groups that is accepted.
 pub const MAX_NESTING: usize = 64;
 
-/// The largest coordinate of any group in world units: the square of a length must not overflow.
-const LARGEST: f64 = 1e150;
+/// The largest coordinate of any group in world units: the cube of its inverse, the determinant of the map that scales it
+/// to one, must not underflow.
+const LARGEST: f64 = 1e100;
 
 /// All groups, children before parents, the root last.
 pub struct GroupPlan<'a> {
