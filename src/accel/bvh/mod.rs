@@ -25,7 +25,7 @@ mod tests;
 
 use super::KernelRow;
 use super::failure::Failure;
-use super::tame::check_extent;
+use super::tame::{DIRECTION, check_extent};
 use crate::base::geometry::Geometry;
 use crate::base::hit::{Hit, HitBatch};
 use crate::base::intersectable::{Intersectable, KernelMode, KernelOptions, QueryKind, Visits};
@@ -36,7 +36,7 @@ use crate::math::aabb::Aabb;
 use batch::Batch;
 use glam::DAffine3;
 use layout::{Child, Instance, Tree};
-use ray::LevelRay;
+use ray::{LevelRay, PlainRay};
 use simd::{Available, Job, Simd, enter};
 use std::cell::Cell;
 use std::sync::Arc;
@@ -132,6 +132,11 @@ impl Kernel {
             return None;
         }
         let tree = &self.trees[self.root()];
+        // Most rays are fit for single precision as they are. (Valid ones hold no NaN, which a maximum would lose.)
+        let (far, long) = (ray.o.abs().max_element(), ray.d.abs().max_element());
+        if far <= tree.reach as f32 && DIRECTION.contains(&long) && ray.tnear < f32::INFINITY {
+            return Some((PlainRay { tree, o: ray.o, d: ray.d, tnear: ray.tnear }.level(), tree.root?));
+        }
         Some((LevelRay::new(tree, *exact, 0)?, tree.root?))
     }
 
