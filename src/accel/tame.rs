@@ -59,6 +59,7 @@ impl Tame {
     }
 
     /// The original's t.
+    #[cfg(feature = "embree")]
     #[inline]
     pub(super) fn restored(&self, t: f64) -> f64 {
         self.shift + t * self.scale
