@@ -62,7 +62,7 @@ pub struct Seen {
     pub rays: u64,
     /// The cases, in order.
     pub cases: Vec<Case>,
-    /// Cases beyond [`MAX_CASES`], which nobody will look at.
+    /// Cases beyond the most that are kept, which nobody will look at.
     pub lost: u64,
 }
 

@@ -1,6 +1,6 @@
 //! The same rays through every kernel, mode, call form and instruction set.
 //!
-//! [`sets`] makes rays of five kinds once, or [`file`] replays them. [`forms`] is the table of ways to ask for them,
+//! [`sets`] makes rays of five kinds once, or [`mod@file`] replays them. [`forms`] is the table of ways to ask for them,
 //! [`kernels`] builds what is to be asked, and [`measure`] runs all rows over them in turn. [`agree`] compares the
 //! answers, [`record`] is what is kept of it all, [`verdict`] compares two records, and [`present`] shows one.
 

@@ -1,7 +1,7 @@
 //! Another program of ours, such as one built against another Embree, that runs the same rays in turn with this one.
 //!
 //! It is started as `skylit bench rays-worker ...`, builds its kernels, and says what it has in one line of JSON
-//! ([`Hello`]). For each line that it is sent ([`Request`]) it answers one ([`Reply`]), until its input ends.
+//! ([`Hello`]). For each line that it is sent (a request) it answers one (a reply), until its input ends.
 
 use super::forms::Answers;
 use super::kernels::KernelInfo;
