@@ -11,7 +11,6 @@ use crate::base::hit::HitBatch;
 use crate::base::intersectable::{Intersectable, KernelOptions};
 use crate::base::ray::{Coherence, Ray, RayBatch};
 use crate::error::Result;
-use crate::math::aabb::Aabb;
 use glam::Vec3;
 use std::sync::Arc;
 use std::time::Instant;
@@ -54,7 +53,7 @@ const ROUNDS: usize = 4;
 
 /// The time that `a` takes for rays of all sorts, over that of `b`.
 fn compare(a: &dyn Intersectable, b: &dyn Intersectable) -> f64 {
-    let batches = rays(&a.bounds());
+    let batches = rays(a);
     let mut fastest = [f64::INFINITY; 2];
     for round in 0..ROUNDS {
         for k in 0..2 {
@@ -67,18 +66,21 @@ fn compare(a: &dyn Intersectable, b: &dyn Intersectable) -> f64 {
     fastest[0] / fastest[1]
 }
 
-fn time(kernel: &dyn Intersectable, batches: &[(RayBatch, Coherence)]) -> f64 {
+fn time(kernel: &dyn Intersectable, batches: &[(RayBatch, RayBatch)]) -> f64 {
     let (mut hits, mut blocked) = (HitBatch::default(), Vec::new());
     let start = Instant::now();
-    for (rays, coherence) in batches {
-        kernel.intersect_batch(rays, &mut hits, *coherence);
-        kernel.occluded_batch(rays, &mut blocked, *coherence);
+    for (bundle, scattered) in batches {
+        kernel.intersect_batch(bundle, &mut hits, Coherence::Coherent);
+        kernel.intersect_batch(scattered, &mut hits, Coherence::Incoherent);
+        kernel.occluded_batch(scattered, &mut blocked, Coherence::Incoherent);
     }
     start.elapsed().as_secs_f64()
 }
 
-/// Bundles from outside, and chords of the bounds.
-fn rays(bounds: &Aabb) -> Vec<(RayBatch, Coherence)> {
+/// Bundles from outside, as a camera sends them, and rays that leave what those meet (where they meet nothing: chords of
+/// the bounds), as a render goes on.
+fn rays(kernel: &dyn Intersectable) -> Vec<(RayBatch, RayBatch)> {
+    let bounds = kernel.bounds();
     let (center, size) = (bounds.center(), bounds.size());
     let mut state = 1u32;
     let mut random = || {
@@ -86,18 +88,26 @@ fn rays(bounds: &Aabb) -> Vec<(RayBatch, Coherence)> {
         (state >> 8) as f32 / (1 << 24) as f32 - 0.5
     };
     let mut batches = Vec::new();
+    let mut hits = HitBatch::default();
     for i in 0..BATCHES {
-        let (mut bundle, mut chords) = (RayBatch::default(), RayBatch::default());
+        let (mut bundle, mut scattered) = (RayBatch::default(), RayBatch::default());
         let eye = center + size.length() * [Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE][i % 4];
         for k in 0..1024u32 {
-            let mut point = || center + Vec3::new(random(), random(), random()) * size;
             let at = center + size * 0.3 * Vec3::new((k % 32) as f32 / 32.0, (k / 32) as f32 / 32.0, 0.1);
             bundle.push(&Ray::new(eye, at - eye, k));
-            let (from, to) = (point(), point());
-            chords.push(&Ray::new(from, to - from, k));
         }
-        batches.push((bundle, Coherence::Coherent));
-        batches.push((chords, Coherence::Incoherent));
+        kernel.intersect_batch(&bundle, &mut hits, Coherence::Coherent);
+        for k in 0..bundle.len() {
+            let ray = bundle.get(k);
+            let mut point = || Vec3::new(random(), random(), random()) * size;
+            let (from, to) = match hits.get(k) {
+                // Short of the surface, on the side that was seen.
+                Some(hit) => (ray.o + ray.d * (hit.t * (1.0 - 1e-4)), point() - ray.d * 0.3),
+                None => (center + point(), point()),
+            };
+            scattered.push(&Ray::new(from, to, ray.key));
+        }
+        batches.push((bundle, scattered));
     }
     batches
 }
