@@ -4,7 +4,7 @@ use super::layout::Tree;
 use super::ray::{BoxRays, PlainRay, sign};
 use super::simd::{LANES, Lanes, Simd};
 use crate::accel::tame::DIRECTION;
-use crate::base::ray::RayBatch;
+use crate::base::ray::{MAX_COORDINATE, RayBatch};
 use bytemuck::cast_slice_mut;
 use glam::Vec3;
 use std::ops::Range;
@@ -97,7 +97,8 @@ impl Columns {
     /// Works out the rest from the first `n` rays. Returns the set of those that single precision carries as they are.
     #[inline(always)]
     pub(super) fn prepare<S: Simd>(&mut self, n: usize, tree: &Tree) -> u64 {
-        let reach = tree.reach as f32;
+        // No further than valid rays may start (`Ray::is_valid`), whatever the tree's extent.
+        let reach = (tree.reach as f32).min(MAX_COORDINATE);
         let mut plain = 0;
         let size = S::splat(f32::from_bits(0x7fff_ffff));
         for i in 0..n.div_ceil(LANES) {

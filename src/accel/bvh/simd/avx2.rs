@@ -10,7 +10,8 @@ pub(super) struct Avx2;
 /// The body of an operation.
 macro_rules! op {
     ($e:expr) => {
-        // SAFETY: this type is only used below the functions that enter, which hold an `Available` of this level.
+        // SAFETY: this type is only used below the functions that enter, which hold an `Available` of this level; `Lanes`
+        // has the size and the alignment of a vector, and prefetching reads nothing.
         unsafe { $e }
     };
 }
