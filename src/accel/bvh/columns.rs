@@ -2,6 +2,7 @@
 
 use super::layout::Tree;
 use super::ray::{BoxRays, PlainRay, sign};
+use super::sheared::ShearedRay;
 use super::simd::{LANES, Lanes, Simd};
 use crate::accel::tame::DIRECTION;
 use crate::base::ray::{MAX_COORDINATE, RayBatch};
@@ -30,6 +31,46 @@ impl Column {
     }
 }
 
+/// What tests of triangles read, as [`ShearedRay`].
+pub(super) struct ShearedColumns {
+    /// The bits of an axis.
+    k: Column,
+    o: [Column; 3],
+    shear: [Column; 2],
+    along: Column,
+}
+
+impl ShearedColumns {
+    /// Works out a vector of rays.
+    #[inline(always)]
+    fn set<S: Simd>(&mut self, i: usize, o: [S::V; 3], d: [S::V; 3]) {
+        let size = S::splat(f32::from_bits(0x7fff_ffff));
+        let (ax, ay, az) = (S::and(d[0], size), S::and(d[1], size), S::and(d[2], size));
+        let (is_x, is_z) = (S::le_bits(ay, ax), S::le_bits(S::max(ax, ay), az));
+        let axis = |k| S::splat(f32::from_bits(k));
+        self.k.0[i] = S::store(S::select(is_z, axis(2), S::select(is_x, axis(0), axis(1))));
+        for (c, [z, x, y]) in [[0, 1, 2], [1, 2, 0], [2, 0, 1]].into_iter().enumerate() {
+            self.o[c].0[i] = S::store(S::select(is_z, o[z], S::select(is_x, o[x], o[y])));
+        }
+        let along = S::div(S::splat(1.0), S::select(is_z, d[2], S::select(is_x, d[0], d[1])));
+        self.along.0[i] = S::store(along);
+        for (c, [z, x, y]) in [[0, 1, 2], [1, 2, 0]].into_iter().enumerate() {
+            let d = S::select(is_z, d[z], S::select(is_x, d[x], d[y]));
+            self.shear[c].0[i] = S::store(S::mul(d, along));
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn ray(&self, r: usize) -> ShearedRay {
+        ShearedRay::from_parts(
+            self.k.get(r).to_bits() as usize,
+            [self.o[0].get(r), self.o[1].get(r), self.o[2].get(r)],
+            [self.shear[0].get(r), self.shear[1].get(r)],
+            self.along.get(r),
+        )
+    }
+}
+
 /// The rays of a stream.
 pub(super) struct Columns {
     pub(super) o: [Column; 3],
@@ -39,6 +80,8 @@ pub(super) struct Columns {
     pub(super) far: [Column; 3],
     pub(super) tnear: Column,
     pub(super) tfar: Column,
+    /// For tests of triangles.
+    pub(super) sheared: ShearedColumns,
 }
 
 impl Columns {
@@ -52,6 +95,7 @@ impl Columns {
             far: [zero; 3],
             tnear: zero,
             tfar: zero,
+            sheared: ShearedColumns { k: zero, o: [zero; 3], shear: [zero; 2], along: zero },
         }
     };
 
@@ -110,6 +154,7 @@ impl Columns {
                 self.near[axis].0[i] = S::store(rays.near[axis]);
                 self.far[axis].0[i] = S::store(rays.far[axis]);
             }
+            self.sheared.set::<S>(i, o, d);
             // Comparisons that NaN fails: a maximum would lose one.
             let (dx, dy, dz) = (S::and(d[0], size), S::and(d[1], size), S::and(d[2], size));
             let (far, long) = (S::splat(reach), S::splat(*DIRECTION.end()));
@@ -132,7 +177,13 @@ impl Columns {
     #[inline(always)]
     pub(super) fn ray<'a>(&self, r: usize, tree: &'a Tree) -> PlainRay<'a> {
         let of = |c: &[Column; 3]| Vec3::new(c[0].get(r), c[1].get(r), c[2].get(r));
-        PlainRay { tree, o: of(&self.o), d: of(&self.d), tnear: self.tnear.get(r) }
+        PlainRay {
+            tree,
+            o: of(&self.o),
+            d: of(&self.d),
+            tnear: self.tnear.get(r),
+            sheared: self.sheared.ray(r),
+        }
     }
 
     /// The set of the first `n` rays whose directions have the signs of ray `r`.

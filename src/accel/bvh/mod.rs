@@ -15,6 +15,7 @@ mod columns;
 mod layout;
 mod open;
 mod ray;
+mod sheared;
 mod simd;
 mod stream;
 mod validate;
@@ -25,7 +26,7 @@ mod tests;
 
 use super::KernelRow;
 use super::failure::Failure;
-use super::tame::{DIRECTION, check_extent};
+use super::tame::check_extent;
 use crate::base::geometry::Geometry;
 use crate::base::hit::{Hit, HitBatch};
 use crate::base::intersectable::{Intersectable, KernelMode, KernelOptions, QueryKind, Visits};
@@ -35,8 +36,8 @@ use crate::error::Result;
 use crate::math::aabb::Aabb;
 use batch::Batch;
 use glam::DAffine3;
-use layout::{Child, Instance, Tree};
-use ray::{LevelRay, PlainRay};
+use layout::{Child, Instance, Target, Tree};
+use ray::{BoxRays, LevelRay, PlainRay};
 use simd::{Available, Job, Simd, enter};
 use std::cell::Cell;
 use std::sync::Arc;
@@ -81,33 +82,55 @@ impl Kernel {
         stack: &mut Stack,
         count: &mut C,
     ) -> Search<'a> {
-        let exact = LocalRay::from_ray(ray);
-        let mut search = Search::ending(exact.tfar, ray.key, &self.failure);
-        if let Some((level, child)) = self.enter_root(ray, &exact) {
-            self.finish::<S, C, ANY>(&level, child, &mut search, stack, count);
+        let mut search = Search::ending(f64::from(ray.tfar), ray.key, &self.failure);
+        let tree = &self.trees[self.root()];
+        let Some(root) = tree.root else { return search };
+        stack.len = 0;
+        stack.reserve(tree.waiting);
+        stack.push(root, f32::NEG_INFINITY);
+        if let Some(plain) = PlainRay::new(ray, tree) {
+            self.search_plain::<S, C, ANY>(&plain, &plain.cull().boxes(tree), &mut search, stack, count);
+        } else if ray.is_valid()
+            && let Some(level) = LevelRay::new(tree, LocalRay::from_ray(ray), 0)
+        {
+            self.finish::<S, C, ANY>(&level, &mut search, stack, count);
         }
         search
     }
 
-    /// Searches a part of the root's tree, and all that is placed there.
+    /// Searches what waits on the stack, of the root's tree, and all that is placed there.
     #[inline(always)]
+    fn search_plain<'a, S: Simd, C: Counter, const ANY: bool>(
+        &'a self,
+        ray: &PlainRay<'a>,
+        boxes: &BoxRays<S>,
+        search: &mut Search,
+        stack: &mut Stack,
+        count: &mut C,
+    ) {
+        let group = &self.geometry.groups[self.root()];
+        if let Stop::At(i) = walk::<S, C, ANY>(ray, boxes, group, search, stack, 0, count) {
+            stack.push(Child::new(Target::Instance(i)), f32::NEG_INFINITY);
+            self.finish::<S, C, ANY>(&ray.level(), search, stack, count);
+        }
+    }
+
+    /// As [`Kernel::search_plain`], for any ray, through all levels.
+    #[inline(never)]
     fn finish<'a, S: Simd, C: Counter, const ANY: bool>(
         &'a self,
         root: &LevelRay<'a>,
-        child: Child,
         search: &mut Search,
         stack: &mut Stack,
         count: &mut C,
     ) {
         let mut here = Frame { level: *root, group: self.root(), from_render: DAffine3::IDENTITY, base: 0 };
-        stack.len = 0;
-        stack.reserve(root.tree.waiting);
-        stack.push(child, f32::NEG_INFINITY);
         // The levels that wait until the one above them is done.
         let mut outer: Vec<Frame> = Vec::new();
         loop {
             let group = &self.geometry.groups[here.group];
-            match walk::<S, C, ANY>(&here.level, group, search, stack, here.base, count) {
+            let boxes = here.level.cull.boxes::<S>(here.level.tree);
+            match walk::<S, C, ANY>(&here.level, &boxes, group, search, stack, here.base, count) {
                 Stop::At(i) => {
                     let instance = here.level.tree.instances[i];
                     let inner = self.below(&here, outer.is_empty(), &instance, &root.exact, search, stack);
@@ -128,16 +151,13 @@ impl Kernel {
     /// The root's level, and where its tree begins; none if the ray meets nothing, or is not valid.
     #[inline(always)]
     fn enter_root<'a>(&'a self, ray: &Ray, exact: &LocalRay) -> Option<(LevelRay<'a>, Child)> {
-        if !ray.is_valid() {
-            return None;
-        }
         let tree = &self.trees[self.root()];
-        // Most rays are fit for single precision as they are. (Valid ones hold no NaN, which a maximum would lose.)
-        let (far, long) = (ray.o.abs().max_element(), ray.d.abs().max_element());
-        if far <= tree.reach as f32 && DIRECTION.contains(&long) && ray.tnear < f32::INFINITY {
-            return Some((PlainRay { tree, o: ray.o, d: ray.d, tnear: ray.tnear }.level(), tree.root?));
-        }
-        Some((LevelRay::new(tree, *exact, 0)?, tree.root?))
+        let level = match PlainRay::new(ray, tree) {
+            Some(plain) => plain.level(),
+            None if !ray.is_valid() => return None,
+            None => LevelRay::new(tree, *exact, 0)?,
+        };
+        Some((level, tree.root?))
     }
 
     /// The level of an instance, and where its tree begins; none if the ray passes it by.

@@ -8,7 +8,7 @@ use super::layout::{Child, Node, Target, Tree};
 use super::open::{Frustum, Opened, open_by_box, open_by_ray};
 use super::ray::sign;
 use super::simd::{LANES, Simd};
-use super::walk::{Search, Stack, leaf_of};
+use super::walk::{Search, Stack, decide, decide_rarely, leaf_of};
 use super::{Kernel, batch::Sink};
 use crate::base::ray::{Coherence, RayBatch};
 use crate::math::aabb::round_up;
@@ -196,10 +196,29 @@ impl Kernel {
                 push::<S, ANY>(tree, &opened, node, waiting);
                 continue;
             }
+            let block = match child.target() {
+                Target::Block(i) if tree.slack != 0.0 => Some((i, &tree.blocks()[i])),
+                _ => None,
+            };
             while rays != 0 {
-                let r = rays.trailing_zeros() as usize;
+                let r = rays.trailing_zeros() as usize % RAYS;
                 rays &= rays - 1;
-                if self.leaf::<S, ANY>(r, child, columns, results, stack) {
+                let what = if let Some((i, block)) = block {
+                    let (tnear, tfar) = (columns.tnear.get(r), columns.tfar.get(r));
+                    let candidates = columns.sheared.ray(r).test::<S, ANY>(block, tnear, tfar);
+                    if candidates.maybe == 0 {
+                        continue;
+                    }
+                    if ANY && candidates.certain != 0 && !tree.has_filters {
+                        alive &= !(1 << r);
+                        results.found |= 1 << r;
+                        continue;
+                    }
+                    What::Candidates(i, candidates.maybe)
+                } else {
+                    What::Child(child)
+                };
+                if self.leaf::<S, ANY>(r, what, columns, results, stack) {
                     if ANY {
                         alive &= !(1 << r);
                     } else {
@@ -215,7 +234,7 @@ impl Kernel {
     fn leaf<S: Simd, const ANY: bool>(
         &self,
         r: usize,
-        child: Child,
+        what: What,
         columns: &Columns,
         results: &mut Results,
         stack: &mut Stack,
@@ -223,17 +242,24 @@ impl Kernel {
         let tree = &self.trees[self.root()];
         let group = &self.geometry.groups[self.root()];
         let ray = columns.ray(r, tree);
-        let has = results.found >> r & 1 == 1;
+        // A ray that asks for any hit has none while it is searched for.
+        let has = !ANY && results.found >> r & 1 == 1;
         let tfar = columns.tfar.get(r);
         let t = if has { results.t[r] } else { f64::from(tfar) };
         let mut search = Search::ending(t, results.key[r], &self.failure);
         search.found = has.then(|| (results.prim[r], results.path[r]));
-        let closer = if let Target::Instance(_) = child.target() {
-            let before = search.found;
-            self.finish::<S, (), ANY>(&ray.level(), child, &mut search, stack, &mut ());
-            search.found != before
-        } else {
-            leaf_of::<S, ANY>(&ray, group, &mut search, child, tfar)
+        let closer = match what {
+            What::Candidates(i, maybe) if ANY => decide_rarely(&ray, group, &mut search, i, maybe),
+            What::Candidates(i, maybe) => decide::<false>(&ray, group, &mut search, i, maybe),
+            What::Child(child) if matches!(child.target(), Target::Instance(_)) => {
+                let before = search.found;
+                stack.len = 0;
+                stack.reserve(tree.waiting);
+                stack.push(child, f32::NEG_INFINITY);
+                self.finish::<S, (), ANY>(&ray.level(), &mut search, stack, &mut ());
+                search.found != before
+            }
+            What::Child(child) => leaf_of::<S, ANY>(&ray, group, &mut search, child, tfar),
         };
         if closer {
             let (prim, path) = search.found.unwrap_or_default();
@@ -242,6 +268,15 @@ impl Kernel {
         }
         closer
     }
+}
+
+/// What of a leaf is left to do for a ray.
+#[derive(Clone, Copy)]
+enum What {
+    /// The lanes of a block that it may meet.
+    Candidates(usize, u32),
+    /// All.
+    Child(Child),
 }
 
 /// Streams whose visits serve fewer rays than this on average gain nothing.

@@ -1,7 +1,7 @@
 //! One ray through one tree.
 
 use super::layout::{Child, Node, Target, Tree};
-use super::ray::{Boxes, LevelRay, TreeRay};
+use super::ray::{BoxRays, Boxes, TreeRay};
 use super::simd::{LANES, Lanes, Simd};
 use crate::accel::{accepted, failure::Failure, first_crossing};
 use crate::base::geometry::{Group, Leaf};
@@ -144,16 +144,18 @@ pub(super) enum Stop {
 /// Goes through what waits on the stack above `base`.
 #[inline(always)]
 pub(super) fn walk<S: Simd, C: Counter, const ANY: bool>(
-    ray: &LevelRay,
+    ray: &impl TreeRay,
+    boxes: &BoxRays<S>,
     group: &Group,
     search: &mut Search,
     stack: &mut Stack,
     base: usize,
     count: &mut C,
 ) -> Stop {
-    let nodes = ray.tree.nodes();
-    let (boxes, first, tnear) = (ray.cull.boxes::<S>(ray.tree), ray.cull.first(), S::splat(ray.cull.tnear));
-    let mut end = ray.cull.end(search.t);
+    let tree = ray.tree();
+    let nodes = tree.nodes();
+    let (first, tnear) = (ray.first(), S::splat(ray.tnear()));
+    let mut end = ray.end(search.t);
     let mut tfar = S::splat(end);
     'next: while stack.len > base {
         let Some(mut child) = stack.pop_before(end) else { continue };
@@ -161,7 +163,7 @@ pub(super) fn walk<S: Simd, C: Counter, const ANY: bool>(
             count.node();
             let node = &nodes[child.index()];
             let hit = boxes.test(first, node, tnear, tfar);
-            match choose::<S, ANY>(ray.tree, node, &hit, stack) {
+            match choose::<S, ANY>(tree, node, &hit, stack) {
                 Some(nearest) => child = nearest,
                 None => continue 'next,
             }
@@ -169,12 +171,12 @@ pub(super) fn walk<S: Simd, C: Counter, const ANY: bool>(
         if let Target::Instance(i) = child.target() {
             return Stop::At(i);
         }
-        count.leaf(|| primitives(ray, child));
+        count.leaf(|| primitives(tree, child));
         if leaf_of::<S, ANY>(ray, group, search, child, end) {
             if ANY {
                 return Stop::Done;
             }
-            end = ray.cull.end(search.t);
+            end = ray.end(search.t);
             tfar = S::splat(end);
         }
     }
@@ -273,9 +275,9 @@ static LANE_BITS: Lanes = {
 };
 
 /// How many primitives a leaf holds.
-fn primitives(ray: &LevelRay, child: Child) -> u64 {
+fn primitives(tree: &Tree, child: Child) -> u64 {
     match child.target() {
-        Target::Block(i) => ray.tree.blocks()[i].count(),
+        Target::Block(i) => tree.blocks()[i].count(),
         Target::Shapes(_, n) => n as u64,
         Target::Node(_) | Target::Instance(_) => 0,
     }
@@ -314,9 +316,8 @@ fn triangles<S: Simd, const ANY: bool>(
     if tree.slack == 0.0 {
         return triangles_by_single::<S>(ray, group, search, index, end);
     }
-    let candidates = ray.cull().triangles::<S, ANY>(block, end);
-    let mut maybe = candidates.maybe;
-    if maybe == 0 {
+    let candidates = ray.sheared().test::<S, ANY>(block, ray.tnear(), end);
+    if candidates.maybe == 0 {
         return false;
     }
     if ANY && candidates.certain != 0 && !tree.has_filters {
@@ -324,6 +325,36 @@ fn triangles<S: Simd, const ANY: bool>(
         return true;
     }
     S::prefetch(&tree.ids()[index]);
+    if ANY {
+        return decide_rarely(ray, group, search, index, candidates.maybe);
+    }
+    decide::<false>(ray, group, search, index, candidates.maybe)
+}
+
+/// Most rays that ask for any hit are answered by single precision.
+#[cold]
+#[inline(never)]
+pub(super) fn decide_rarely(
+    ray: &impl TreeRay,
+    group: &Group,
+    search: &mut Search,
+    index: usize,
+    maybe: u32,
+) -> bool {
+    decide::<true>(ray, group, search, index, maybe)
+}
+
+/// Whether one of those lanes of a block that a ray may meet is the closest hit now, or any hit.
+#[inline(always)]
+pub(super) fn decide<const ANY: bool>(
+    ray: &impl TreeRay,
+    group: &Group,
+    search: &mut Search,
+    index: usize,
+    mut maybe: u32,
+) -> bool {
+    let tree = ray.tree();
+    let block = &tree.blocks()[index];
     let exact = ray.exact();
     let test = TriangleRay::new(exact.o, exact.d);
     let mut closer = false;
@@ -358,15 +389,15 @@ fn triangles_by_single<S: Simd>(
     index: usize,
     end: f32,
 ) -> bool {
-    let (tree, cull) = (ray.tree(), ray.cull());
-    let (mut hits, t) = cull.triangles_by_single::<S>(&tree.blocks()[index], end);
+    let tree = ray.tree();
+    let (mut hits, t) = ray.sheared().hits::<S>(&tree.blocks()[index], ray.tnear(), end);
     let mut closer = false;
     while hits != 0 {
         let lane = hits.trailing_zeros() as usize % LANES;
         hits &= hits - 1;
         let owner = tree.owner(index, lane);
         let (prim, path) = (tree.ids()[index].prim[lane], ray.first_path() + u64::from(owner));
-        let t = cull.restored(t.0[lane]);
+        let t = ray.restored(t.0[lane]);
         let hit = Hit { t: t as f32, prim, path };
         if !tree.has_filters || stands(&ray.exact(), &group.leaves[owner as usize], search, &hit) {
             closer |= search.offer(t, prim, path);

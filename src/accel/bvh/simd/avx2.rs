@@ -84,6 +84,10 @@ impl Simd for Avx2 {
         op!(_mm256_or_ps(a, b))
     }
     #[inline(always)]
+    fn xor(a: __m256, b: __m256) -> __m256 {
+        op!(_mm256_xor_ps(a, b))
+    }
+    #[inline(always)]
     fn select(bits: __m256, a: __m256, b: __m256) -> __m256 {
         op!(_mm256_blendv_ps(b, a, bits))
     }

@@ -52,6 +52,7 @@ pub(super) trait Simd: Copy {
     fn le_bits(a: Self::V, b: Self::V) -> Self::V;
     fn and(a: Self::V, b: Self::V) -> Self::V;
     fn or(a: Self::V, b: Self::V) -> Self::V;
+    fn xor(a: Self::V, b: Self::V) -> Self::V;
     /// `a` where the bits of the lane are set, else `b`.
     fn select(bits: Self::V, a: Self::V, b: Self::V) -> Self::V;
     /// Bit i: whether the topmost bit of lane i is set.

@@ -86,6 +86,10 @@ impl Simd for Portable {
         zip(a, b, |a, b| f32::from_bits(a.to_bits() | b.to_bits()))
     }
     #[inline(always)]
+    fn xor(a: Lanes, b: Lanes) -> Lanes {
+        zip(a, b, |a, b| f32::from_bits(a.to_bits() ^ b.to_bits()))
+    }
+    #[inline(always)]
     fn select(bits: Lanes, a: Lanes, b: Lanes) -> Lanes {
         let mut out = b;
         for i in 0..LANES {

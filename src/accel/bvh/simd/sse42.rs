@@ -85,6 +85,10 @@ impl Simd for Sse42 {
         op!([_mm_or_ps(a[0], b[0]), _mm_or_ps(a[1], b[1])])
     }
     #[inline(always)]
+    fn xor(a: [__m128; 2], b: [__m128; 2]) -> [__m128; 2] {
+        op!([_mm_xor_ps(a[0], b[0]), _mm_xor_ps(a[1], b[1])])
+    }
+    #[inline(always)]
     fn select(bits: [__m128; 2], a: [__m128; 2], b: [__m128; 2]) -> [__m128; 2] {
         op!([_mm_blendv_ps(b[0], a[0], bits[0]), _mm_blendv_ps(b[1], a[1], bits[1])])
     }

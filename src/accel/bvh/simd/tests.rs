@@ -25,6 +25,7 @@ impl Job for Everything {
             S::store(S::select(smaller, a, b)),
             S::store(S::and(smaller, a)),
             S::store(S::or(S::and(smaller, a), S::and(smaller, c))),
+            S::store(S::xor(b, S::splat(-0.0))),
         ];
         let fused = vec![
             S::store(S::mul_add(a, b, c)),
