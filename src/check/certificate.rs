@@ -1,5 +1,6 @@
 //! What is promised, what was found, and the verdict.
 
+use super::RayKind;
 use super::quadrics::MAX_ULP;
 use super::spawn::MAX_OFFSET;
 use super::tally::Tally;
@@ -164,6 +165,8 @@ pub struct Certificate {
     pub rays: u64,
     /// Seed of every random choice.
     pub seed: u64,
+    /// The kinds that were asked for; all where empty.
+    pub kinds: Vec<RayKind>,
     /// The kernels.
     pub kernels: Vec<KernelFacts>,
     /// The meshes.

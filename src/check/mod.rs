@@ -31,6 +31,7 @@ use crate::scene::desc::SceneDesc;
 use bodies::Body;
 use certificate::{Certificate, Check, KernelFacts, MeshFacts};
 use leaks::{Aim, leaks};
+use serde::Serialize;
 use solid::Solid;
 use spawn::spawned;
 use std::sync::Arc;
@@ -43,6 +44,8 @@ pub struct CheckOptions {
     pub rays: u64,
     /// Seed of every random choice.
     pub seed: u64,
+    /// The kinds; all where empty.
+    pub kinds: Vec<RayKind>,
     /// Kernels by name; all of this build where empty.
     pub kernels: Vec<String>,
     /// See [`KernelOptions`].
@@ -51,8 +54,48 @@ pub struct CheckOptions {
 
 impl Default for CheckOptions {
     fn default() -> Self {
-        CheckOptions { rays: 1_000_000, seed: 0, kernels: Vec::new(), kernel: KernelOptions::default() }
+        let (kinds, kernels) = (Vec::new(), Vec::new());
+        CheckOptions { rays: 1_000_000, seed: 0, kinds, kernels, kernel: KernelOptions::default() }
     }
+}
+
+impl CheckOptions {
+    fn wants(&self, kind: RayKind) -> bool {
+        self.kinds.is_empty() || self.kinds.contains(&kind)
+    }
+}
+
+/// Kinds of rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RayKind {
+    /// From inside a mesh, in random directions.
+    Random,
+    /// From inside at vertices.
+    Vertices,
+    /// From inside at points of edges.
+    Edges,
+    /// From inside just beside both.
+    Beside,
+    /// Spawned at surface points.
+    Spawned,
+    /// Spawned under a sheet that lies close above.
+    Tunnelling,
+    /// At quadrics from afar.
+    Quadrics,
+}
+
+impl RayKind {
+    /// All of them with their names.
+    pub const ALL: [(&'static str, RayKind); 7] = [
+        ("random", RayKind::Random),
+        ("vertices", RayKind::Vertices),
+        ("edges", RayKind::Edges),
+        ("beside", RayKind::Beside),
+        ("spawned", RayKind::Spawned),
+        ("tunnelling", RayKind::Tunnelling),
+        ("quadrics", RayKind::Quadrics),
+    ];
 }
 
 /// Told how far the examination is.
@@ -73,11 +116,11 @@ const MAX_LOOKED_AT: u64 = 10_000;
 const PLAIN_WORK: u64 = 50_000_000;
 
 /// The kinds of rays from inside.
-const AIMS: [(Check, Aim); 4] = [
-    (Check::LeaksAtRandom, Aim::Random),
-    (Check::LeaksAtVertices, Aim::Vertex),
-    (Check::LeaksAtEdges, Aim::Edge),
-    (Check::LeaksBeside, Aim::Beside),
+const AIMS: [(RayKind, Check, Aim); 4] = [
+    (RayKind::Random, Check::LeaksAtRandom, Aim::Random),
+    (RayKind::Vertices, Check::LeaksAtVertices, Aim::Vertex),
+    (RayKind::Edges, Check::LeaksAtEdges, Aim::Edge),
+    (RayKind::Beside, Check::LeaksBeside, Aim::Beside),
 ];
 
 /// A kernel under test.
@@ -120,8 +163,14 @@ pub fn examine(
         input: input.to_owned(),
         rays: options.rays,
         seed: options.seed,
+        kinds: options.kinds.clone(),
         ..Certificate::default()
     };
+    if !options.kinds.is_empty() {
+        let asked = RayKind::ALL.iter().filter(|k| options.wants(k.1)).map(|k| k.0);
+        let asked = asked.collect::<Vec<_>>().join(", ");
+        certificate.notes.push(format!("only these kinds of rays were asked for: {asked}"));
+    }
     if found.more > 0 {
         certificate
             .notes
@@ -129,7 +178,10 @@ pub fn examine(
     }
     let placements = sweep::placements();
     let targets = (found.list.len() * placements.len() + 1) as u64;
-    let quadric_steps = (quadrics::BODIES.len() * quadrics::DISTANCES.len()) as u64;
+    let quadric_steps = match options.wants(RayKind::Quadrics) {
+        true => (quadrics::BODIES.len() * quadrics::DISTANCES.len()) as u64,
+        false => 0,
+    };
     watch.begin(targets + quadric_steps);
     let mut run = Run { certificate, options, watch, targets };
     run.target(&Target {
@@ -153,7 +205,9 @@ pub fn examine(
             }
         }
     }
-    run.quadrics()?;
+    if options.wants(RayKind::Quadrics) {
+        run.quadrics()?;
+    }
     Ok(run.certificate)
 }
 
@@ -230,25 +284,30 @@ impl Run<'_> {
         let solids: Vec<Solid> =
             meshes.iter().filter_map(|&path| Solid::new(geometry, path, target.seed)).collect();
         for t in &kernels {
-            for (check, aim) in AIMS {
+            for (_, check, aim) in AIMS.into_iter().filter(|(kind, ..)| self.options.wants(*kind)) {
                 let each = t.rays.div_ceil(solids.len().max(1) as u64);
                 let of = |s: &Solid| leaks(s, &*t.kernel, aim, each, target.seed ^ check as u64);
                 let tally = solids.iter().map(of).fold(Default::default(), |a: tally::Tally, b| a.merged(&b));
                 self.certificate.add(check, names, &t.name, tally);
             }
-            let s = spawned(geometry, &*t.kernel, t.rays, target.seed);
-            for (check, tally) in [
-                (Check::SelfHits, s.self_hits),
-                (Check::Neighbours, s.neighbours),
-                (Check::Offset, s.offset),
-                (Check::Point, s.point),
-                (Check::Distance, s.distance),
-            ] {
-                self.certificate.add(check, names, &t.name, tally);
+            if self.options.wants(RayKind::Spawned) {
+                let s = spawned(geometry, &*t.kernel, t.rays, target.seed);
+                for (check, tally) in [
+                    (Check::SelfHits, s.self_hits),
+                    (Check::Neighbours, s.neighbours),
+                    (Check::Offset, s.offset),
+                    (Check::Point, s.point),
+                    (Check::Distance, s.distance),
+                ] {
+                    self.certificate.add(check, names, &t.name, tally);
+                }
             }
             t.kernel.take_failure()?;
         }
         drop(kernels);
+        if !self.options.wants(RayKind::Tunnelling) {
+            return Ok(());
+        }
         match meshes.first().map(|&path| Sheets::new(geometry, path, target.seed)).transpose()?.flatten() {
             Some(sheets) => self.tunnelling(target, &sheets),
             None => Ok(()),

@@ -1,11 +1,12 @@
 //! `skylit check`: a certificate of numerical stability for a scene or a mesh.
 
+use super::args::amount;
 use super::scene_args::SceneArgs;
 use super::{Setting, interrupt, print};
 use crate::accel;
 use crate::base::intersectable::KernelOptions;
 use crate::check::certificate::Certificate;
-use crate::check::{CheckOptions, Watch, examine};
+use crate::check::{CheckOptions, RayKind, Watch, examine};
 use crate::error::{Error, Result, unknown_name};
 use crate::image::write::{check_file, write_file};
 use crate::report::machine::Machine;
@@ -19,9 +20,12 @@ use std::path::PathBuf;
 pub struct CheckArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Rays of each kind for each kernel, over all placements [default: 1000000]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000_000_000))]
+    /// Rays of each kind for each kernel, over all placements, such as 300k or 2M [default: 1M]
+    #[arg(long, value_name = "N", value_parser = |s: &str| amount(s, 1..=1_000_000_000_000))]
     rays: Option<u64>,
+    /// Only these kinds of rays: random, vertices, edges, beside, spawned, tunnelling, quadrics [default: all]
+    #[arg(long, value_name = "KIND,...", value_delimiter = ',', value_parser = kind)]
+    only: Vec<RayKind>,
     /// Kernels to check (see `skylit list backend`) [default: all]
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     backend: Vec<String>,
@@ -52,6 +56,7 @@ pub fn run(args: &CheckArgs, setting: &Setting) -> Result<()> {
     let options = CheckOptions {
         rays: args.rays.unwrap_or(usual.rays),
         seed: args.seed.unwrap_or(usual.seed),
+        kinds: args.only.clone(),
         kernels: args.backend.clone(),
         kernel: KernelOptions { threads: setting.threads, ..usual.kernel },
     };
@@ -84,6 +89,13 @@ fn outcome(certificate: &Certificate) -> Result<()> {
         None => Ok(()),
         Some(_) => Err(Error::Failed(certificate.verdict())),
     }
+}
+
+/// A kind of rays by name.
+fn kind(name: &str) -> std::result::Result<RayKind, String> {
+    let known = || RayKind::ALL.iter().map(|k| k.0);
+    let found = RayKind::ALL.iter().find(|k| k.0 == name);
+    found.map(|k| k.1).ok_or_else(|| unknown_name("kind of rays", name, known()))
 }
 
 /// What the JSON file holds.

@@ -93,7 +93,7 @@ impl Kernel {
         } else if ray.is_valid()
             && let Some(level) = LevelRay::new(tree, LocalRay::from_ray(ray), 0)
         {
-            self.finish::<S, C, ANY>(&level, &mut search, stack, count);
+            self.rest::<C, ANY>(&level, &mut search, stack, count);
         }
         search
     }
@@ -111,41 +111,20 @@ impl Kernel {
         let group = &self.geometry.groups[self.root()];
         if let Stop::At(i) = walk::<S, C, ANY>(ray, boxes, group, search, stack, 0, count) {
             stack.push(Child::new(Target::Instance(i)), f32::NEG_INFINITY);
-            self.finish::<S, C, ANY>(&ray.level(), search, stack, count);
+            self.rest::<C, ANY>(&ray.level(), search, stack, count);
         }
     }
 
-    /// As [`Kernel::search_plain`], for any ray, through all levels.
-    #[inline(never)]
-    fn finish<'a, S: Simd, C: Counter, const ANY: bool>(
+    /// As [`Kernel::search_plain`], for any ray, through all levels. Not part of its caller's code, which is of use to most rays
+    /// without it: so it has to enter the level of instructions again.
+    fn rest<'a, C: Counter, const ANY: bool>(
         &'a self,
         root: &LevelRay<'a>,
         search: &mut Search,
         stack: &mut Stack,
         count: &mut C,
     ) {
-        let mut here = Frame { level: *root, group: self.root(), from_render: DAffine3::IDENTITY, base: 0 };
-        // The levels that wait until the one above them is done.
-        let mut outer: Vec<Frame> = Vec::new();
-        loop {
-            let group = &self.geometry.groups[here.group];
-            let boxes = here.level.cull.boxes::<S>(here.level.tree);
-            match walk::<S, C, ANY>(&here.level, &boxes, group, search, stack, here.base, count) {
-                Stop::At(i) => {
-                    let instance = here.level.tree.instances[i];
-                    let inner = self.below(&here, outer.is_empty(), &instance, &root.exact, search, stack);
-                    if let Some((inner, child)) = inner {
-                        stack.push(child, f32::NEG_INFINITY);
-                        outer.push(std::mem::replace(&mut here, inner));
-                    }
-                }
-                Stop::Done if ANY && search.found.is_some() => return,
-                Stop::Done => match outer.pop() {
-                    Some(frame) => here = frame,
-                    None => return,
-                },
-            }
-        }
+        enter(self.level, Rest::<C, ANY> { kernel: self, root, search, stack, count });
     }
 
     /// The root's level, and where its tree begins; none if the ray meets nothing, or is not valid.
@@ -194,6 +173,46 @@ struct Frame<'a> {
     from_render: DAffine3,
     /// The length of the stack where the level began.
     base: usize,
+}
+
+/// A search that goes through levels of nesting.
+struct Rest<'r, 'a, 's, C, const ANY: bool> {
+    kernel: &'a Kernel,
+    root: &'r LevelRay<'a>,
+    search: &'r mut Search<'s>,
+    stack: &'r mut Stack,
+    count: &'r mut C,
+}
+
+impl<C: Counter, const ANY: bool> Job for Rest<'_, '_, '_, C, ANY> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<S: Simd>(self) {
+        let Rest { kernel, root, search, stack, count } = self;
+        let mut here = Frame { level: *root, group: kernel.root(), from_render: DAffine3::IDENTITY, base: 0 };
+        // The levels that wait until the one above them is done.
+        let mut outer: Vec<Frame> = Vec::new();
+        loop {
+            let group = &kernel.geometry.groups[here.group];
+            let boxes = here.level.cull.boxes::<S>(here.level.tree);
+            match walk::<S, C, ANY>(&here.level, &boxes, group, search, stack, here.base, count) {
+                Stop::At(i) => {
+                    let instance = here.level.tree.instances[i];
+                    let inner = kernel.below(&here, outer.is_empty(), &instance, &root.exact, search, stack);
+                    if let Some((inner, child)) = inner {
+                        stack.push(child, f32::NEG_INFINITY);
+                        outer.push(std::mem::replace(&mut here, inner));
+                    }
+                }
+                Stop::Done if ANY && search.found.is_some() => return,
+                Stop::Done => match outer.pop() {
+                    Some(frame) => here = frame,
+                    None => return,
+                },
+            }
+        }
+    }
 }
 
 thread_local! {

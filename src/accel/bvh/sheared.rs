@@ -184,3 +184,102 @@ const TINY: f32 = 1e-36;
 fn edge<S: Simd>(p: &[S::V; 3], q: &[S::V; 3]) -> S::V {
     S::mul_sub(p[0], q[1], S::mul(p[1], q[0]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::bvh::simd::{Available, Job, LANES, enter};
+    use crate::math::simd::Level;
+    use crate::math::triangle::TriangleRay;
+    use crate::testing::TestRng;
+
+    struct Test<'a>(&'a ShearedRay, &'a Block, f32, f32);
+
+    impl Job for Test<'_> {
+        type Output = [Candidates; 2];
+        #[inline(always)]
+        fn run<S: Simd>(self) -> [Candidates; 2] {
+            let Test(ray, block, tnear, tfar) = self;
+            [ray.test::<S, false>(block, tnear, tfar), ray.test::<S, true>(block, tnear, tfar)]
+        }
+    }
+
+    /// A block of triangles of about a size, and a ray at them, of which most are decided by rounding.
+    fn case(rng: &mut TestRng, kind: u32) -> (Block, [[Vec3; 3]; LANES], Vec3, Vec3) {
+        // From sizes whose products underflow to those whose products overflow.
+        let scale = [1.0, 1e-3, 1e-13, 1e-19, 1e3, 1e14][kind as usize / 8 % 6];
+        let middle = rng.cube().as_vec3() * scale;
+        let size = scale * [1.0, 0.1, 1e-2, 1e-4][(rng.bits() % 4) as usize];
+        let mut block = Block::empty();
+        let triangles: [[Vec3; 3]; LANES] = std::array::from_fn(|_| {
+            let mut v = [0; 3].map(|_| middle + rng.cube().as_vec3() * size);
+            if kind % 3 == 0 {
+                // A sliver.
+                v[2] = v[0] + (v[1] - v[0]) * rng.f32() + rng.cube().as_vec3() * (size * 1e-6);
+            }
+            v
+        });
+        for (lane, v) in triangles.iter().enumerate().skip(kind as usize % 2) {
+            block.set(lane, *v);
+        }
+        let v = triangles[(rng.bits() % LANES as u64) as usize];
+        let (a, b) = (rng.f32(), rng.f32());
+        let inside = v[0] + (v[1] - v[0]) * (a * (1.0 - b)) + (v[2] - v[0]) * (a * b);
+        let step = |rng: &mut TestRng| rng.cube().as_vec3() * (scale * f32::EPSILON * 4.0);
+        let from = rng.cube().as_vec3() * scale;
+        let (o, d) = match kind % 8 {
+            // As rays are spawned: from beside a triangle, anywhere.
+            0 | 1 => (inside + step(rng), rng.direction()),
+            // Along the triangle.
+            2 => (inside + step(rng), v[1] - v[0] + step(rng)),
+            // At corners and edges, exactly and beside.
+            3 => (from, v[0] - from),
+            4 => (from, v[0] + (v[1] - v[0]) * rng.f32() - from),
+            5 => (from, v[1] - from + step(rng)),
+            // At the inside.
+            6 => (from, inside - from),
+            _ => (from, rng.direction()),
+        };
+        // Of a length as kernels see it.
+        let longest = d.abs().max_element();
+        let d = if longest > 0.0 { d / longest } else { Vec3::X };
+        (block, triangles, o, d)
+    }
+
+    /// Culling lets through what double precision accepts, and is certain only of that.
+    #[test]
+    fn double_precision_is_never_contradicted() {
+        let mut rng = TestRng::new(7);
+        let (mut accepted, mut culled_behind, mut behind, mut certain) = (0, 0, 0, 0);
+        for kind in 0..60_000 {
+            let (block, triangles, o, d) = case(&mut rng, kind);
+            let sheared = ShearedRay::new(o, d, 0.0);
+            let exact = TriangleRay::new(o.as_dvec3(), d.as_dvec3());
+            let t = triangles.map(|v| exact.distance(v.map(|p| p.as_dvec3())));
+            let ends = [(0.0, f32::INFINITY), (0.0, 1.0), (0.5, 2.0)];
+            let (tnear, tfar) = ends[kind as usize / 3 % 3];
+            let is_hit = |t: f64| t >= f64::from(tnear) && t <= f64::from(tfar);
+            for level in Level::available() {
+                let available = Available::new(Some(level)).expect("available");
+                let [plain, asked] = enter(available, Test(&sheared, &block, tnear, tfar));
+                assert_eq!(plain.maybe, asked.maybe, "{level:?} {kind}");
+                for lane in kind as usize % 2..LANES {
+                    let [maybe, sure] = [asked.maybe, asked.certain].map(|set| set >> lane & 1 == 1);
+                    let hit = t[lane].is_some_and(is_hit);
+                    let what = || format!("{level:?}, case {kind}, lane {lane}: {:?} {o:?} {d:?}", t[lane]);
+                    assert!(maybe || !hit, "culled: {}", what());
+                    assert!(!sure || hit, "not certain: {}", what());
+                    accepted += u32::from(hit);
+                    certain += u32::from(sure);
+                    let is_behind = kind % 8 < 2 && t[lane].is_some_and(|t| t < 0.0);
+                    behind += u32::from(is_behind);
+                    culled_behind += u32::from(is_behind && !maybe);
+                }
+                assert_eq!(asked.maybe & (kind % 2), 0, "a lane without a triangle");
+            }
+        }
+        // That the cases are what they should be: many hits, many of them certain, and most planes behind known to be (not those of slivers, a third).
+        assert!(accepted > 50_000 && certain > accepted / 4, "{accepted} {certain}");
+        assert!(culled_behind * 10 > behind * 6, "{culled_behind} of {behind}");
+    }
+}

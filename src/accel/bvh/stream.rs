@@ -256,7 +256,7 @@ impl Kernel {
                 stack.len = 0;
                 stack.reserve(tree.waiting);
                 stack.push(child, f32::NEG_INFINITY);
-                self.finish::<S, (), ANY>(&ray.level(), &mut search, stack, &mut ());
+                self.rest::<(), ANY>(&ray.level(), &mut search, stack, &mut ());
                 search.found != before
             }
             What::Child(child) => leaf_of::<S, ANY>(&ray, group, &mut search, child, tfar),
