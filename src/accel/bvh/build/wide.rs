@@ -182,15 +182,7 @@ pub(super) fn build_top(refs: &mut [Ref], set: Set, plan: &Plan) -> Result<Top> 
         let root = build_part(refs, &set, plan, &mut NO_BINS.clone(), &mut part)?;
         return Ok(Top::Part(part, root));
     }
-    let sets = eight_sets(refs, &set, plan, &mut NO_BINS.clone());
-    // Each set's own primitives, so that the sets can be worked on at once.
-    let mut rest = refs;
-    let mut apart = Vec::with_capacity(sets.len());
-    for s in sets {
-        let (own, other) = rest.split_at_mut(s.len());
-        rest = other;
-        apart.push((own, Set { start: 0, end: s.len(), ..s }));
-    }
+    let apart = eight_sets_by_all(refs, set, plan);
     let children = apart
         .into_par_iter()
         .map(|(own, s)| Ok((bounds(&s), build_top(own, s, plan)?)))
@@ -229,6 +221,32 @@ fn eight_sets(refs: &mut [Ref], set: &Set, plan: &Plan, room: &mut Bins) -> Vec<
         sets.insert(largest + 1, (right, is_leaf(refs, &right, plan)));
     }
     sets.into_iter().map(|(s, _)| s).collect()
+}
+
+/// As [`eight_sets`], of a large set, each with its own primitives: in rounds of splits that all threads share, the largest sets first.
+fn eight_sets_by_all<'r>(refs: &'r mut [Ref], set: Set, plan: &Plan) -> Vec<(&'r mut [Ref], Set)> {
+    let mut parts = vec![(refs, set)];
+    while parts.len() < LANES {
+        let mut inner: Vec<usize> =
+            (0..parts.len()).filter(|&i| !is_leaf(parts[i].0, &parts[i].1, plan)).collect();
+        if inner.is_empty() {
+            break;
+        }
+        let area = |i: &usize| parts[*i].1.bounds.half_area();
+        inner.sort_by(|a, b| area(b).total_cmp(&area(a)));
+        inner.truncate(LANES - parts.len());
+        let of = |(i, (own, s)): (usize, (&'r mut [Ref], Set))| {
+            if !inner.contains(&i) {
+                return vec![(own, s)];
+            }
+            let [left, right] = split(own, &s, plan.bins, plan.units, &mut NO_BINS.clone());
+            let (n, m) = (left.len(), right.len());
+            let (a, b) = own.split_at_mut(n);
+            vec![(a, Set { start: 0, end: n, ..left }), (b, Set { start: 0, end: m, ..right })]
+        };
+        parts = parts.into_par_iter().enumerate().flat_map_iter(of).collect();
+    }
+    parts
 }
 
 /// Builds a set into `part`. Recursion is as deep as the tree, which `split` bounds.
