@@ -141,8 +141,8 @@ struct Target<'a> {
 /// Examines a scene: all of its shapes in all placements, the scene as it is, and quadrics from afar.
 ///
 /// # Errors
-/// [`Error::Usage`] for a scene without objects, what the scene builder says of the scene as it is, or [`build_kernel`] of a kernel's name. Placements that cannot
-/// be built are noted.
+/// [`Error::Usage`] for a scene without objects, what the scene builder says of the scene as it is, or [`build_kernel`]
+/// of a kernel's name. Placements that cannot be built are noted.
 pub fn examine(
     scene: &SceneDesc,
     input: &str,

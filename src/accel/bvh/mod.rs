@@ -1,10 +1,11 @@
 //! The in-house kernel: trees of eight children over the triangles, shapes and placed groups of each group.
 //!
-//! **It decides as the oracle does.** Boxes and triangles are culled in single precision, eight at a time, by tests that
-//! provably let through whatever the double-precision tests would accept (`ray.rs`); what is left is decided by those very
-//! tests ([`crate::math::triangle`], [`Shape::intersect`](crate::base::shape::Shape)), and of several hits at one distance the
-//! first in the order of paths and primitives counts. So the kernel finds what [`super::brute`] finds, to the bit,
-//! whatever the tree, the instruction set or the order of visits; and it is watertight because that test is.
+//! **It decides as the oracle does.** Boxes and triangles are culled in single precision, eight at a time, by tests
+//! that provably let through whatever the double-precision tests would accept (`ray.rs`); what is left is decided by
+//! those very tests ([`crate::math::triangle`], [`Shape::intersect`](crate::base::shape::Shape)), and of several hits
+//! at one distance the first in the order of paths and primitives counts. So the kernel finds what [`super::brute`]
+//! finds, to the bit, whatever the tree, the instruction set or the order of visits; and it is watertight because that
+//! test is.
 //!
 //! Nested groups are met as they are nested, to any depth: a ray is taken into a group's space in double precision, and
 //! what remains to be done outside waits on an explicit stack.
@@ -61,8 +62,9 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    /// Builds the trees. Errors where coordinates are beyond [`MAX_COORDINATE`](crate::base::ray::MAX_COORDINATE), where there are more primitives than its numbers can
-    /// name, and where the processor lacks the instructions asked for.
+    /// Builds the trees. Errors where coordinates are beyond [`MAX_COORDINATE`](crate::base::ray::MAX_COORDINATE),
+    /// where there are more primitives than its numbers can name, and where the processor lacks the instructions asked
+    /// for.
     pub fn new(geometry: Arc<Geometry>, options: &KernelOptions) -> Result<Self> {
         check_extent(&geometry)?;
         let level = Available::new(options.simd)?;
@@ -115,8 +117,8 @@ impl Kernel {
         }
     }
 
-    /// As [`Kernel::search_plain`], for any ray, through all levels. Not part of its caller's code, which is of use to most rays
-    /// without it: so it has to enter the level of instructions again.
+    /// As [`Kernel::search_plain`], for any ray, through all levels. Not part of its caller's code, which is of use to
+    /// most rays without it: so it has to enter the level of instructions again.
     fn rest<'a, C: Counter, const ANY: bool>(
         &'a self,
         root: &LevelRay<'a>,

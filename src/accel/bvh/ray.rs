@@ -1,14 +1,16 @@
-//! A ray as traversal uses it: in single precision, to cull, with bounds on what that loses (for triangles: `sheared.rs`).
+//! A ray as traversal uses it: in single precision, to cull, with bounds on what that loses (for triangles:
+//! `sheared.rs`).
 //!
 //! **What must hold.** Whatever the double-precision tests would accept, culling lets through. Let u = 2^-24, and R the
-//! largest sum, by axis, of the extent of the tree and the size of the ray's origin: no difference between a point of the
-//! tree and the origin exceeds it.
+//! largest sum, by axis, of the extent of the tree and the size of the ray's origin: no difference between a point of
+//! the tree and the origin exceeds it.
 //!
-//! *Boxes.* A plane b is met at t = (b - o) / d, computed as fma(b, r, c) with r = 1/d and c = -o r. Against the exact ray, b r is
-//! off by 2u |b r| (d, and the division, rounded once each) and o r by 4u |o r| (o, d, the division, the product), the sums by u each:
-//! less than 8u (|b| + |o|) |r| <= 8u R |r| together, which is a constant of the ray. Added to the far planes' c and
-//! taken from the near planes', it makes the test conservative at no cost. A component of d below 1e-10 of the largest is
-//! enlarged to that, which moves the ray by no more than 1e-10 R within the tree, and keeps 1/d finite.
+//! *Boxes.* A plane b is met at t = (b - o) / d, computed as fma(b, r, c) with r = 1/d and c = -o r. Against the exact
+//! ray, b r is off by 2u |b r| (d, and the division, rounded once each) and o r by 4u |o r| (o, d, the division, the
+//! product), the sums by u each: less than 8u (|b| + |o|) |r| <= 8u R |r| together, which is a constant of the ray.
+//! Added to the far planes' c and taken from the near planes', it makes the test conservative at no cost. A component
+//! of d below 1e-10 of the largest is enlarged to that, which moves the ray by no more than 1e-10 R within the tree,
+//! and keeps 1/d finite.
 
 use super::layout::{Node, Tree};
 use super::sheared::ShearedRay;

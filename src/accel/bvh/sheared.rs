@@ -1,27 +1,32 @@
 //! A ray against eight triangles, in single precision, to cull; with bounds on what that loses.
 //!
-//! **What must hold.** Whatever the double-precision test ([`crate::math::triangle`]) would accept, culling lets through.
+//! **What must hold.** Whatever the double-precision test ([`crate::math::triangle`]) would accept, culling lets
+//! through.
 //!
-//! As Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013, corners are moved to the origin and
-//! sheared so that the ray runs along z, the axis of its direction's largest component: z = vz - oz, x = (vx - ox) - (dx/dz) z.
-//! Let u = 2^-24, L the longest side of the triangle's box, Z the largest |z| of its corners, and e an error of the ray's
-//! origin (none if that is an f32). Where the ray meets the triangle, |x| <= 2L for every corner, so |vx - ox| <= 2L + Z.
+//! As Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013, corners are moved to the origin
+//! and sheared so that the ray runs along z, the axis of its direction's largest component: with z = vz - oz, x is vx -
+//! ox less (dx/dz) z. Let u = 2^-24, L the longest side of the triangle's box, Z the largest |z| of its corners, and e
+//! an error of the ray's origin (none if that is an f32). Where the ray meets the triangle, |x| <= 2L for every corner,
+//! so |vx - ox| <= 2L + Z.
 //!
-//! *Corners.* Of x, the first difference is off by u |vx - ox| + e, the shear by 4u (the components of d, the division and the
-//! product are rounded), z by u Z + e, the product by u, the result by u |x|: less than **D = 8u (L + Z) + 2e** together.
+//! *Corners.* Of x, the first difference is off by u |vx - ox| + e, the shear by 4u (the components of d, the division
+//! and the product are rounded), z by u Z + e, the product by u, the result by u |x|: less than **D = 8u (L + Z) + 2e**
+//! together.
 //!
-//! *Edge functions* p0 q1 - p1 q0 of such corners. The products are off by 2 (4L D + D^2), the roundings by 4u (2L + D)^2;
-//! as u L <= D/8, less than **E = 14 D (L + D)** together. An edge function has a sign for certain only beyond E, and a ray may meet a triangle
-//! while all three can have one sign.
+//! *Edge functions* p0 q1 - p1 q0 of such corners. The products are off by 2 (4L D + D^2), the roundings by 4u (2L +
+//! D)^2; as u L <= D/8, less than **E = 14 D (L + D)** together. An edge function has a sign for certain only beyond E,
+//! and a ray may meet a triangle while all three can have one sign.
 //!
 //! *Distances.* A corner's z / dz is off by less than D / |dz|.
 //!
-//! *Sides.* The volume A x B . C of the corners seen from the origin says on which side of the plane that lies; in single precision it is
-//! off by less than 8u times the same with all products positive (Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust
-//! Geometric Predicates", 1997, where 7.1 would do), and by 6 e L^2. U + V + W says on which side of the ray's direction it lies, for certain beyond 4E. If
-//! both are certain and the plane lies behind the origin, the ray meets nothing there: the plane's distance is negative, and so is a corner's, by which the
-//! double-precision test bounds it. (Its own errors are less than 2^-47 (L + Z) L^2; the bound has 2^-40 for them.) This spares rays
-//! the decision about the triangle that they leave, whose distance is some u of the scene's extent: a hundred times the bound.
+//! *Sides.* The volume A x B . C of the corners seen from the origin says on which side of the plane that lies; in
+//! single precision it is off by less than 8u times the same with all products positive (Shewchuk, "Adaptive Precision
+//! Floating-Point Arithmetic and Fast Robust Geometric Predicates", 1997, where 7.1 would do), and by 6 e L^2. U + V +
+//! W says on which side of the ray's direction it lies, for certain beyond 4E. If both are certain and the plane lies
+//! behind the origin, the ray meets nothing there: the plane's distance is negative, and so is a corner's, by which the
+//! double-precision test bounds it. (Its own errors are less than 2^-47 (L + Z) L^2; the bound has 2^-40 for them.)
+//! This spares rays the decision about the triangle that they leave, whose distance is some u of the scene's extent: a
+//! hundred times the bound.
 
 use super::layout::Block;
 use super::simd::{Lanes, Simd};
@@ -52,8 +57,8 @@ pub(super) struct Candidates {
 }
 
 impl ShearedRay {
-    /// Of a ray that single precision carries as it is: the axis that is z, and by the axes x, y, z of the sheared space the origin;
-    /// dx / dz and dy / dz; 1 / dz.
+    /// Of a ray that single precision carries as it is: the axis that is z, and by the axes x, y, z of the sheared
+    /// space the origin; dx / dz and dy / dz; 1 / dz.
     #[inline(always)]
     pub(super) fn from_parts(axis: usize, o: [f32; 3], shear: [f32; 2], along: f32) -> Self {
         ShearedRay { k: AXES[axis % 3], o, shear, along, slip: 0.0 }
@@ -85,8 +90,8 @@ impl ShearedRay {
         [S::neg_mul_add(S::splat(self.shear[0]), z, x), S::neg_mul_add(S::splat(self.shear[1]), z, y), z]
     }
 
-    /// Tests the triangles of a block. The ray runs from `tnear`, which is not negative, to `tfar`; whether a hit is certain is
-    /// only asked where `CERTAIN`.
+    /// Tests the triangles of a block. The ray runs from `tnear`, which is not negative, to `tfar`; whether a hit is
+    /// certain is only asked where `CERTAIN`.
     #[inline(always)]
     pub(super) fn test<S: Simd, const CERTAIN: bool>(
         &self,
@@ -124,7 +129,8 @@ impl ShearedRay {
         Candidates { maybe, certain: maybe & inside & within }
     }
 
-    /// The triangles whose planes lie behind the ray's origin, for certain. `sum` is that of the edge functions, `slack` the error of one, `reach` the L + Z.
+    /// The triangles whose planes lie behind the ray's origin, for certain. `sum` is that of the edge functions,
+    /// `slack` the error of one, `reach` the L + Z.
     #[inline(always)]
     fn behind<S: Simd>(&self, block: &Block, sum: S::V, slack: S::V, reach: S::V) -> u32 {
         let zero = S::splat(-0.0);
@@ -213,7 +219,7 @@ mod tests {
         let mut block = Block::empty();
         let triangles: [[Vec3; 3]; LANES] = std::array::from_fn(|_| {
             let mut v = [0; 3].map(|_| middle + rng.cube().as_vec3() * size);
-            if kind % 3 == 0 {
+            if kind.is_multiple_of(3) {
                 // A sliver.
                 v[2] = v[0] + (v[1] - v[0]) * rng.f32() + rng.cube().as_vec3() * (size * 1e-6);
             }
@@ -278,7 +284,8 @@ mod tests {
                 assert_eq!(asked.maybe & (kind % 2), 0, "a lane without a triangle");
             }
         }
-        // That the cases are what they should be: many hits, many of them certain, and most planes behind known to be (not those of slivers, a third).
+        // That the cases are what they should be: many hits, many of them certain, and most planes behind known to be
+        // (not those of slivers, a third).
         assert!(accepted > 50_000 && certain > accepted / 4, "{accepted} {certain}");
         assert!(culled_behind * 10 > behind * 6, "{culled_behind} of {behind}");
     }

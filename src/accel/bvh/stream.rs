@@ -1,7 +1,7 @@
-//! Batches of rays with something in common. Up to 64 go through the tree together: a node is opened once for all of them
-//! that may meet it, and they are tested against it without a branch between them; what waits on the stack is a child and
-//! the set of its rays (Barringer and Akenine-Moeller, "Dynamic Ray Stream Traversal", 2014). Rays that run nearly parallel
-//! are tested eight at a time, against the boxes that a frustum around all of them meets.
+//! Batches of rays with something in common. Up to 64 go through the tree together: a node is opened once for all of
+//! them that may meet it, and they are tested against it without a branch between them; what waits on the stack is a
+//! child and the set of its rays (Barringer and Akenine-Moeller, "Dynamic Ray Stream Traversal", 2014). Rays that run
+//! nearly parallel are tested eight at a time, against the boxes that a frustum around all of them meets.
 
 use super::columns::{Columns, RAYS};
 use super::layout::{Child, Node, Target, Tree};

@@ -239,8 +239,8 @@ fn choose<S: Simd, const ANY: bool>(
     Some(stack.children[stack.len])
 }
 
-/// As `choose`, without a branch on how many are hit, and so without order among the others: for rays that take turns, whose
-/// next visit is not waited for, so that mispredicted branches are what costs.
+/// As `choose`, without a branch on how many are hit, and so without order among the others: for rays that take turns,
+/// whose next visit is not waited for, so that mispredicted branches are what costs.
 #[inline(always)]
 pub(super) fn choose_one<S: Simd, const ANY: bool>(
     node: &Node,

@@ -223,7 +223,8 @@ fn eight_sets(refs: &mut [Ref], set: &Set, plan: &Plan, room: &mut Bins) -> Vec<
     sets.into_iter().map(|(s, _)| s).collect()
 }
 
-/// As [`eight_sets`], of a large set, each with its own primitives: in rounds of splits that all threads share, the largest sets first.
+/// As [`eight_sets`], of a large set, each with its own primitives: in rounds of splits that all threads share, the
+/// largest sets first.
 fn eight_sets_by_all<'r>(refs: &'r mut [Ref], set: Set, plan: &Plan) -> Vec<(&'r mut [Ref], Set)> {
     let mut parts = vec![(refs, set)];
     while parts.len() < LANES {
