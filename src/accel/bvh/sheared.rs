@@ -133,7 +133,8 @@ impl ShearedRay {
     /// `slack` the error of one, `reach` the L + Z.
     #[inline(always)]
     fn behind<S: Simd>(&self, block: &Block, sum: S::V, slack: S::V, reach: S::V) -> u32 {
-        let zero = S::splat(-0.0);
+        // The bit of the sign, and a zero that is as good as another.
+        let minus_zero = S::splat(-0.0);
         let abs = S::splat(f32::from_bits(0x7fff_ffff));
         let from = |axis: usize, c: usize| {
             S::sub(S::load(&block.v[self.k[axis] as usize % 3][c]), S::splat(self.o[axis]))
@@ -156,12 +157,12 @@ impl ShearedRay {
         let length = S::load(&block.size);
         let margin = S::mul_add(S::mul(rest, length), length, S::splat(f32::MIN_POSITIVE));
         let margin = S::mul_add(most, S::splat(8.0 * U32), margin);
-        let sign = S::and(S::xor(sum, S::splat(self.along)), zero);
+        let sign = S::and(S::xor(sum, S::splat(self.along)), minus_zero);
         let side = S::xor(volume, sign);
         let four = S::mul(slack, S::splat(4.0));
-        let clear = S::le(four, sum) | S::le(sum, S::xor(four, zero));
+        let clear = S::le(four, sum) | S::le(sum, S::xor(four, minus_zero));
         // What overflows says nothing.
-        clear & S::le(S::add(side, margin), zero) & S::le(S::splat(f32::MIN), side)
+        clear & S::le(S::add(side, margin), minus_zero) & S::le(S::splat(f32::MIN), side)
     }
 
     /// As [`ShearedRay::test`], without bounds: whatever single precision says. The triangles that are hit by its

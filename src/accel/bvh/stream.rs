@@ -203,7 +203,7 @@ impl Kernel {
             while rays != 0 {
                 let r = rays.trailing_zeros() as usize % RAYS;
                 rays &= rays - 1;
-                let what = if let Some((i, block)) = block {
+                let work = if let Some((i, block)) = block {
                     let (tnear, tfar) = (columns.tnear.get(r), columns.tfar.get(r));
                     let candidates = columns.sheared.ray(r).test::<S, ANY>(block, tnear, tfar);
                     if candidates.maybe == 0 {
@@ -214,11 +214,11 @@ impl Kernel {
                         results.found |= 1 << r;
                         continue;
                     }
-                    What::Candidates(i, candidates.maybe)
+                    LeafWork::Candidates(i, candidates.maybe)
                 } else {
-                    What::Child(child)
+                    LeafWork::Child(child)
                 };
-                if self.leaf::<S, ANY>(r, what, columns, results, stack) {
+                if self.leaf::<S, ANY>(r, work, columns, results, stack) {
                     if ANY {
                         alive &= !(1 << r);
                     } else {
@@ -234,7 +234,7 @@ impl Kernel {
     fn leaf<S: Simd, const ANY: bool>(
         &self,
         r: usize,
-        what: What,
+        work: LeafWork,
         columns: &Columns,
         results: &mut Results,
         stack: &mut Stack,
@@ -248,10 +248,10 @@ impl Kernel {
         let t = if has { results.t[r] } else { f64::from(tfar) };
         let mut search = Search::ending(t, results.key[r], &self.failure);
         search.found = has.then(|| (results.prim[r], results.path[r]));
-        let closer = match what {
-            What::Candidates(i, maybe) if ANY => decide_rarely(&ray, group, &mut search, i, maybe),
-            What::Candidates(i, maybe) => decide::<false>(&ray, group, &mut search, i, maybe),
-            What::Child(child) if matches!(child.target(), Target::Instance(_)) => {
+        let closer = match work {
+            LeafWork::Candidates(i, maybe) if ANY => decide_rarely(&ray, group, &mut search, i, maybe),
+            LeafWork::Candidates(i, maybe) => decide::<false>(&ray, group, &mut search, i, maybe),
+            LeafWork::Child(child) if matches!(child.target(), Target::Instance(_)) => {
                 let before = search.found;
                 stack.len = 0;
                 stack.reserve(tree.waiting);
@@ -259,7 +259,7 @@ impl Kernel {
                 self.rest::<(), ANY>(&ray.level(), &mut search, stack, &mut ());
                 search.found != before
             }
-            What::Child(child) => leaf_of::<S, ANY>(&ray, group, &mut search, child, tfar),
+            LeafWork::Child(child) => leaf_of::<S, ANY>(&ray, group, &mut search, child, tfar),
         };
         if closer {
             let (prim, path) = search.found.unwrap_or_default();
@@ -270,9 +270,9 @@ impl Kernel {
     }
 }
 
-/// What of a leaf is left to do for a ray.
+/// What is left to do in a leaf for a ray.
 #[derive(Clone, Copy)]
-enum What {
+enum LeafWork {
     /// The lanes of a block that it may meet.
     Candidates(usize, u32),
     /// All.
