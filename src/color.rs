@@ -140,6 +140,16 @@ impl Sum for Rgb {
     }
 }
 
+/// From linear values to the bytes of a display's picture.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Transfer {
+    /// The sRGB curve.
+    #[default]
+    Srgb,
+    /// The power 1 / gamma. 1 writes linear values, which every display shows too dark: some programs do.
+    Gamma(f32),
+}
+
 /// sRGB-encoded value in [0, 1] to linear (IEC 61966-2-1).
 pub fn srgb_to_linear(v: f32) -> f32 {
     if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }

@@ -80,6 +80,23 @@ pub trait Material: Send + Sync {
     /// decisions, not for radiometry.
     fn albedo(&self, m: &Prepared, wo: Vec3) -> Rgb;
 
+    /// Whether it keeps the laws: light may travel backwards, and no more leaves than arrives. The looks of some old
+    /// programs do not, and say so.
+    fn is_physical(&self) -> bool {
+        true
+    }
+
+    /// Radiance that the surface shows of itself to a classic ray tracer, without shining on anything.
+    fn ambient(&self, _m: &Prepared) -> Rgb {
+        Rgb::BLACK
+    }
+
+    /// The share of what lies in the mirror direction that a classic ray tracer adds to what [`Material::eval`] gives,
+    /// seen from `wo`; black for materials that reflect by [`Material::sample`] alone.
+    fn mirrored(&self, _m: &Prepared, _wo: Vec3) -> Rgb {
+        Rgb::BLACK
+    }
+
     /// Whether it scatters by Dirac lobes alone, so that sampling lights is in vain.
     fn is_delta(&self) -> bool {
         false

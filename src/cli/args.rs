@@ -1,5 +1,7 @@
 //! How values of flags are written.
 
+use crate::color::Transfer;
+use crate::formats::native::GAMMAS;
 use std::num::NonZero;
 use std::str::FromStr;
 use std::time::Duration;
@@ -60,6 +62,24 @@ impl FromStr for Size {
         let size = [side(w)?, side(h)?];
         crate::formats::native::check_film(size)?;
         Ok(Size(size))
+    }
+}
+
+/// `srgb`, `linear` or a gamma.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TransferArg(pub Transfer);
+
+impl FromStr for TransferArg {
+    type Err = String;
+
+    fn from_str(s: &str) -> Result<Self, String> {
+        match s {
+            "srgb" => Ok(TransferArg(Transfer::Srgb)),
+            "linear" => Ok(TransferArg(Transfer::Gamma(1.0))),
+            _ => number_in(s, GAMMAS).map(|gamma| TransferArg(Transfer::Gamma(gamma as f32))).map_err(|_| {
+                format!("takes srgb, linear or a gamma from {} to {}", GAMMAS.start(), GAMMAS.end())
+            }),
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! Flags that say what is written, and the writing.
 
-use super::args::number_in;
+use super::args::{TransferArg, number_in};
+use crate::color::Transfer;
 use crate::error::Result;
 use crate::image::picture::SampleKind;
 use crate::image::tonemap::{Look, ToneMap};
@@ -28,6 +29,9 @@ pub struct OutputArgs {
     /// Tone operator, for PNG and JPEG (see `skylit list tonemap`) [default: none]
     #[arg(long, value_name = "NAME")]
     tonemap: Option<String>,
+    /// Curve of PNG and JPEG: srgb, linear, or a gamma such as 2.2 [default: the scene's, which is srgb]
+    #[arg(long, value_name = "srgb|linear|GAMMA")]
+    transfer: Option<TransferArg>,
     /// Floats of 32 instead of 16 bits in EXR
     #[arg(long)]
     full_float: bool,
@@ -50,7 +54,11 @@ impl OutputArgs {
         self.outputs.iter().try_for_each(|path| check_writable(path))?;
         let exposure = self.exposure.unwrap_or(0.0) as f32;
         let film_layers = film_layers::REGISTRY.iter().filter(|f| names.contains(&f.name)).collect();
-        Ok(OutputPlan { aovs, film_layers, look: Look { exposure, tonemap: tonemap.unwrap_or_default() } })
+        Ok(OutputPlan {
+            aovs,
+            film_layers,
+            look: Look { exposure, tonemap: tonemap.unwrap_or_default(), ..Look::default() },
+        })
     }
 
     /// Writes every output, each whole or not at all.
@@ -60,7 +68,9 @@ impl OutputArgs {
         rendered.layers.push_planes(&mut picture);
         plan.film_layers.iter().for_each(|layer| (layer.push)(&rendered.film, &mut picture));
         picture.metadata = info.metadata.clone();
-        let options = WriteOptions { look: plan.look, alpha: info.background == Background::Transparent };
+        let transfer = self.transfer.map_or(info.transfer, |TransferArg(t)| t);
+        let look = Look { transfer, ..plan.look };
+        let options = WriteOptions { look, alpha: info.background == Background::Transparent };
         self.outputs.iter().try_for_each(|path| {
             write_picture(path, &picture, &options)?;
             log::info!("wrote {}", path.display());
@@ -73,6 +83,8 @@ impl OutputArgs {
 pub struct PictureInfo {
     /// PNG gets alpha where the background is to be transparent.
     pub background: Background,
+    /// The scene's curve of 8-bit pictures.
+    pub transfer: Transfer,
     /// Key and value.
     pub metadata: Vec<(String, String)>,
 }

@@ -114,6 +114,7 @@ pub fn run(args: &RenderArgs, setting: &Setting) -> Result<()> {
     let s = &args.sampling;
     let integrator = choose_integrator(&desc, s.integrator.as_deref(), s.max_depth)?;
     let renderer = Renderer { integrator, settings };
+    let transfer = desc.film.transfer;
     let load = start.elapsed();
     if desc.objects.is_empty() {
         log::warn!("the scene has no object: only the sky can be seen");
@@ -126,7 +127,7 @@ pub fn run(args: &RenderArgs, setting: &Setting) -> Result<()> {
     bar.finish();
     let rendered = rendered?;
     let mut record = Record::new(&args.scene.input, &scene, &rendered, &renderer.settings);
-    let info = PictureInfo { background: scene.background, metadata: record.metadata() };
+    let info = PictureInfo { background: scene.background, transfer, metadata: record.metadata() };
     interrupt::hold_off(|| {
         let saving = Instant::now();
         args.output.write(&plan.output, &rendered, &info)?;

@@ -8,8 +8,9 @@ use crate::base::registry::{Node, Params, Value, build};
 use crate::cameras::{View, frame_bounds};
 use crate::error::{Error, Result, unknown_name};
 use crate::formats::families::{Family, Kind};
+use crate::formats::{Compat, LoadOptions};
 use crate::math::aabb::DAabb;
-use crate::scene::desc::{Content, FilmDesc, Named, ObjectDesc, SceneDesc};
+use crate::scene::desc::{Content, Named, ObjectDesc, SceneDesc};
 use crate::{formats, materials, shapes};
 use clap::{Args, ValueEnum};
 use glam::{DAffine3, DMat3, DVec3};
@@ -22,6 +23,9 @@ pub struct SceneArgs {
     /// Scene file (.toml), or a mesh alone (.obj or .ply, also packed as .gz or .zst)
     #[arg(value_name = "SCENE|MESH")]
     pub input: PathBuf,
+    /// For scenes of other programs: as those show them, or in radiometric units [default: exact]
+    #[arg(long, value_name = "exact|physical")]
+    compat: Option<CompatArg>,
     #[command(flatten)]
     sky: SkyArgs,
     #[command(flatten)]
@@ -83,6 +87,21 @@ enum Up {
     Z,
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum CompatArg {
+    Exact,
+    Physical,
+}
+
+impl From<CompatArg> for Compat {
+    fn from(arg: CompatArg) -> Self {
+        match arg {
+            CompatArg::Exact => Compat::Exact,
+            CompatArg::Physical => Compat::Physical,
+        }
+    }
+}
+
 impl SceneArgs {
     /// Loads the input and applies the flags.
     pub fn load(&self) -> Result<SceneDesc> {
@@ -95,7 +114,9 @@ impl SceneArgs {
             )));
         }
         let sky = self.sky.sky.as_deref().map(|s| sky_arg::load(s, self.sky.sky_encoding)).transpose()?;
-        let mut scene = formats::load(&self.input)?;
+        let compat = self.compat.map_or(Compat::default(), Compat::from);
+        let options = LoadOptions { compat, ..LoadOptions::default() };
+        let mut scene = formats::load_with(&self.input, &options)?;
         if let Some(node) = sky {
             let old = scene.sky.take();
             let mut new = crate::scene::desc::SkyDesc::new(node);
@@ -104,7 +125,7 @@ impl SceneArgs {
         }
         self.sky.adjust(&mut scene)?;
         if let Some(Size(size)) = self.size {
-            scene.film = FilmDesc { size };
+            scene.film.size = size;
         }
         if let Some(Background(b)) = self.background {
             scene.background = b;

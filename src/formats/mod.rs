@@ -19,59 +19,180 @@ use std::path::Path;
 /// One mesh format: the extension that names it, and its reader.
 struct MeshFormat {
     extension: &'static str,
+    /// Whether the first bytes of a file look like it; asked where the extension says nothing.
+    recognise: fn(&[u8]) -> bool,
     parse: fn(&Path, &[u8]) -> Result<MeshData>,
 }
 
-const MESH_FORMATS: &[MeshFormat] =
-    &[MeshFormat { extension: "obj", parse: obj::parse }, MeshFormat { extension: "ply", parse: ply::parse }];
+const MESH_FORMATS: &[MeshFormat] = &[
+    MeshFormat { extension: "ply", recognise: |b| b.starts_with(b"ply"), parse: ply::parse },
+    MeshFormat { extension: "obj", recognise: looks_like_obj, parse: obj::parse },
+];
+
+/// Whether the first statement is one of OBJ's.
+fn looks_like_obj(head: &[u8]) -> bool {
+    const WORDS: &[&str] = &["v", "vn", "vt", "vp", "f", "o", "g", "s", "mtllib", "usemtl"];
+    let text = String::from_utf8_lossy(head);
+    let mut statements = text.lines().map(str::trim).filter(|l| !l.is_empty() && !l.starts_with('#'));
+    statements.next().and_then(|l| l.split_whitespace().next()).is_some_and(|word| WORDS.contains(&word))
+}
+
+/// One format of scene files.
+pub struct SceneFormat {
+    /// The extension that names it.
+    pub extension: &'static str,
+    /// One line: what it is.
+    pub doc: &'static str,
+    /// Whether the first bytes of a file look like it. It is asked where the extension says nothing, or lies: where
+    /// the content looks like another format and not like this one.
+    recognise: fn(&[u8]) -> bool,
+    parse: fn(&SceneText, &LoadOptions) -> Result<SceneDesc>,
+}
+
+/// Every format of scene files.
+pub static SCENE_FORMATS: &[SceneFormat] = &[native::FORMAT];
+
+/// The content of a scene file.
+pub struct SceneText<'a> {
+    /// For messages, and for the files it names, which are relative to its folder.
+    pub path: &'a Path,
+    /// Unpacked.
+    pub bytes: &'a [u8],
+}
+
+impl<'a> SceneText<'a> {
+    /// The text, without a byte order mark.
+    ///
+    /// # Errors
+    /// [`Error::Content`] with the line of the first byte that is no UTF-8.
+    pub fn text(&self) -> Result<&'a str> {
+        match std::str::from_utf8(self.bytes) {
+            Ok(text) => Ok(text.strip_prefix('\u{feff}').unwrap_or(text)),
+            Err(e) => {
+                let line = 1 + self.bytes[..e.valid_up_to()].iter().filter(|b| **b == b'\n').count();
+                Err(Error::content_at(self.path, line, 0, "this is not text in UTF-8"))
+            }
+        }
+    }
+}
+
+/// Whose look a scene file of another program shall have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Compat {
+    /// As its own program shows it, with all that is not physical about it.
+    #[default]
+    Exact,
+    /// In radiometric units: the same things, lit as they would be.
+    Physical,
+}
+
+/// How scene files are read.
+#[derive(Debug, Clone)]
+pub struct LoadOptions {
+    /// The kinds that scene files may name; for those of a program's own, [`Families::of`] its
+    /// [`crate::scene::registry::Registry`].
+    pub families: Families,
+    /// For files of other programs.
+    pub compat: Compat,
+}
+
+impl Default for LoadOptions {
+    fn default() -> Self {
+        LoadOptions { families: Families::registered(), compat: Compat::default() }
+    }
+}
 
 /// The extensions of mesh files that [`load_mesh`] reads, without those of packing.
 pub fn mesh_extensions() -> impl Iterator<Item = &'static str> {
     MESH_FORMATS.iter().map(|format| format.extension)
 }
 
-/// The extension of native scene files.
-const NATIVE: &str = "toml";
+/// What a file turned out to be.
+enum Kind {
+    Scene(&'static SceneFormat),
+    Mesh(&'static MeshFormat),
+}
 
-/// Loads a scene file, or a mesh alone as a scene; the extension tells which.
+/// Loads a scene file, or a mesh alone as a scene. The extension tells which; where it says nothing, or its format is
+/// not what the file holds, the content does.
 ///
 /// # Errors
 /// Those of [`load_with`].
 pub fn load(path: &Path) -> Result<SceneDesc> {
-    load_with(path, &Families::registered())
+    load_with(path, &LoadOptions::default())
 }
 
-/// As [`load`], where scene files may name the kinds of `families`: with those of a program's own,
-/// [`Families::of`] its [`crate::scene::registry::Registry`].
+/// As [`load`], by these options.
 ///
 /// # Errors
-/// Those of [`native::load`] and [`mesh_scene::load`]; an unknown extension.
-pub fn load_with(path: &Path, families: &Families) -> Result<SceneDesc> {
+/// [`Error::File`] if the file cannot be read; [`Error::Content`] if what stands in it cannot be used; an unknown
+/// kind of file.
+pub fn load_with(path: &Path, options: &LoadOptions) -> Result<SceneDesc> {
     if is_mesh_path(path) {
         return mesh_scene::load(path);
     }
-    let extension = source::content_extension(path);
-    if extension.as_deref() == Some(NATIVE) {
-        return native::load(path, families);
+    if path.is_dir() {
+        return Err(Error::content(path, "is a folder, where a scene file or a mesh is wanted"));
     }
-    let known = || std::iter::once(NATIVE).chain(mesh_extensions());
-    let what = match extension {
-        _ if path.is_dir() => "is a folder, where a scene file or a mesh is wanted".to_owned(),
-        Some(extension) => unknown_name("kind of scene file", &extension, known()),
-        None => {
-            let known = known().collect::<Vec<_>>().join(", ");
-            format!("has no extension, which would tell the kind of file; known: {known}")
-        }
-    };
-    Err(Error::content(path, what))
+    let extension = source::content_extension(path);
+    let named = SCENE_FORMATS.iter().find(|f| Some(f.extension) == extension.as_deref());
+    let bytes = source::read(path)?;
+    match kind_of(path, &bytes, named)? {
+        Kind::Mesh(_) => mesh_scene::load(path),
+        Kind::Scene(format) => (format.parse)(&SceneText { path, bytes: &bytes }, options),
+    }
 }
+
+/// The format that the extension names, unless the content says otherwise.
+fn kind_of(path: &Path, bytes: &[u8], named: Option<&'static SceneFormat>) -> Result<Kind> {
+    let head = &bytes[..bytes.len().min(HEAD)];
+    if let Some(format) = named.filter(|f| (f.recognise)(head)) {
+        return Ok(Kind::Scene(format));
+    }
+    let scene = SCENE_FORMATS.iter().find(|f| (f.recognise)(head)).map(Kind::Scene);
+    let found = scene.or_else(|| MESH_FORMATS.iter().find(|f| (f.recognise)(head)).map(Kind::Mesh));
+    match (found, named) {
+        (Some(found), None) => Ok(found),
+        (Some(found), Some(named)) => {
+            let what = match &found {
+                Kind::Scene(f) => f.extension,
+                Kind::Mesh(f) => f.extension,
+            };
+            log::warn!(
+                "{}: is named .{}, but holds what a .{what} file does",
+                path.display(),
+                named.extension
+            );
+            Ok(found)
+        }
+        // Its own reader says best what is wrong with it.
+        (None, Some(named)) => Ok(Kind::Scene(named)),
+        (None, None) => {
+            let known = || SCENE_FORMATS.iter().map(|f| f.extension).chain(mesh_extensions());
+            let what = match source::content_extension(path) {
+                Some(extension) => unknown_name("kind of scene file", &extension, known()),
+                None => {
+                    let known = known().collect::<Vec<_>>().join(", ");
+                    format!(
+                        "has neither an extension nor a content that tells the kind of file; known: {known}"
+                    )
+                }
+            };
+            Err(Error::content(path, what))
+        }
+    }
+}
+
+/// As many bytes as a format is recognised by.
+const HEAD: usize = 1 << 14;
 
 /// Whether [`load_mesh`] knows the kind of file that `path` names.
 pub fn is_mesh_path(path: &Path) -> bool {
     source::content_extension(path).is_some_and(|e| mesh_extensions().any(|known| known == e))
 }
 
-/// Loads the mesh file at `path`, its kind told by the extension in any case, also packed (`.gz`, `.zst`). What was
+/// Loads the mesh file at `path`, its kind told by the extension in any case or else by the content, also packed
+/// (`.gz`, `.zst`). What was
 /// mended on the way is counted in the mesh and logged as one warning.
 ///
 /// # Errors
@@ -79,13 +200,15 @@ pub fn is_mesh_path(path: &Path) -> bool {
 /// or there is no surface in it.
 pub fn load_mesh(path: &Path) -> Result<MeshData> {
     let extension = source::content_extension(path);
-    let known = MESH_FORMATS.iter().find(|format| Some(format.extension) == extension.as_deref());
-    let Some(format) = known else {
+    let named = MESH_FORMATS.iter().find(|format| Some(format.extension) == extension.as_deref());
+    let bytes = source::read(path)?;
+    let by_content = || MESH_FORMATS.iter().find(|f| (f.recognise)(&bytes[..bytes.len().min(HEAD)]));
+    let Some(format) = named.or_else(by_content) else {
         let name = extension.unwrap_or_default();
         let what = unknown_name("kind of mesh file", &name, mesh_extensions());
         return Err(Error::content(path, format!("{what} (each also packed as .gz or .zst)")));
     };
-    let mesh = (format.parse)(path, &source::read(path)?)?;
+    let mesh = (format.parse)(path, &bytes)?;
     if let Some(repairs) = mesh.repairs.describe() {
         log::warn!("{}: {repairs}", path.display());
     }

@@ -1,6 +1,6 @@
 //! From radiance to what a display shows: exposure, then a tone operator.
 
-use crate::color::{Rgb, srgb_to_linear};
+use crate::color::{Rgb, Transfer, srgb_to_linear};
 use crate::error::{Error, unknown_name};
 use std::fmt;
 use std::str::FromStr;
@@ -84,6 +84,8 @@ pub struct Look {
     pub exposure: f32,
     /// Applied after the exposure.
     pub tonemap: ToneMap,
+    /// From there to bytes.
+    pub transfer: Transfer,
 }
 
 impl Look {
@@ -194,7 +196,7 @@ mod tests {
         for _ in 0..20_000 {
             let c = Rgb::new(value(), value(), value());
             for operator in ToneMap::ALL {
-                let out = Look { exposure: 1.5, tonemap: operator }.apply(c);
+                let out = Look { exposure: 1.5, tonemap: operator, ..Look::default() }.apply(c);
                 assert!(
                     out.to_array().iter().all(|v| (0.0..=1.0).contains(v)),
                     "{operator}: {c:?} to {out:?}"
@@ -221,7 +223,7 @@ mod tests {
 
     #[test]
     fn exposure_is_in_stops() {
-        let look = Look { exposure: -2.0, tonemap: ToneMap::None };
+        let look = Look { exposure: -2.0, ..Look::default() };
         assert_eq!(look.apply(Rgb::splat(2.0)), Rgb::splat(0.5));
     }
 

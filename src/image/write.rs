@@ -4,7 +4,7 @@
 use super::picture::Picture;
 use super::tonemap::Look;
 use super::{exr_write, srgb8};
-use crate::color::Rgb;
+use crate::color::{Rgb, Transfer};
 use crate::error::{Error, Result};
 use rayon::prelude::*;
 use std::fs::{File, OpenOptions};
@@ -65,7 +65,7 @@ pub fn write_file(path: &Path, content: &[u8]) -> Result<()> {
 /// Writes a picture; the extension of `path` says in which format. A file that stands there is replaced.
 ///
 /// - `exr`: all planes, half or float as each says, ZIP compression, metadata as string attributes.
-/// - `png`: `R G B` (or `Y` as gray values), 8 bits through the look and the sRGB curve, metadata as text; with
+/// - `png`: `R G B` (or `Y` as gray values), 8 bits through the look and its curve, metadata as text; with
 ///   [`WriteOptions::alpha`] also `A`, and the colour divided by it, as the format has it.
 /// - `jpg`: as `png`, without alpha and metadata.
 ///
@@ -160,6 +160,14 @@ fn write_exr(path: &Path, out: &mut File, picture: &Picture) -> io::Result<()> {
     Ok(())
 }
 
+/// The byte nearest to the encoding of a linear value; NaN counts as 0.
+fn encoder(transfer: Transfer) -> impl Fn(f32) -> u8 {
+    move |v| match transfer {
+        Transfer::Srgb => srgb8::encode(v),
+        Transfer::Gamma(gamma) => (v.max(0.0).min(1.0).powf(1.0 / gamma) * 255.0).round() as u8,
+    }
+}
+
 /// Rows of 8-bit samples, `channels` (3 or 4) a pixel.
 fn to_bytes(picture: &Picture, look: &Look, channels: usize) -> io::Result<Vec<u8>> {
     let plane = |name: &str| picture.plane(name).or_else(|| picture.plane("Y")).map(|p| &p.data);
@@ -168,6 +176,7 @@ fn to_bytes(picture: &Picture, look: &Look, channels: usize) -> io::Result<Vec<u
     };
     let alpha = picture.plane("A").map(|p| &p.data).filter(|_| channels == 4);
     let scale = look.exposure.exp2();
+    let encode = encoder(look.transfer);
     let mut bytes = vec![0; picture.width * picture.height * channels];
     bytes.par_chunks_mut(picture.width * channels).enumerate().for_each(|(y, row)| {
         for (x, out) in row.chunks_exact_mut(channels).enumerate() {
@@ -176,7 +185,7 @@ fn to_bytes(picture: &Picture, look: &Look, channels: usize) -> io::Result<Vec<u
             // The format wants colour not multiplied by alpha.
             let factor = if a > 0.0 { scale / a } else { 0.0 };
             let shown = look.tonemap.apply(Rgb::new(r[at], g[at], b[at]) * factor);
-            out[..3].copy_from_slice(&shown.to_array().map(srgb8::encode));
+            out[..3].copy_from_slice(&shown.to_array().map(&encode));
             if let Some(last) = out.get_mut(3) {
                 *last = (a * 255.0).round() as u8;
             }
@@ -193,7 +202,10 @@ fn write_png(out: &mut File, picture: &Picture, options: &WriteOptions) -> io::R
     encoder.set_color(if channels == 4 { png::ColorType::Rgba } else { png::ColorType::Rgb });
     encoder.set_depth(png::BitDepth::Eight);
     encoder.set_compression(png::Compression::Fast);
-    encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+    // Whoever asks for another curve wants the bytes that a program wrote which said nothing of its curve.
+    if options.look.transfer == Transfer::Srgb {
+        encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
+    }
     for (key, value) in &picture.metadata {
         // International text takes any value; only the keyword is restricted, to 79 Latin letters.
         let keyword: String = key.chars().filter(|c| c.is_ascii_graphic() || *c == ' ').take(79).collect();

@@ -206,7 +206,7 @@ fn samples_agree_with_eval() {
 
 #[test]
 fn light_may_travel_backwards() {
-    for m in members() {
+    for m in members().into_iter().filter(|m| m.it.is_physical()) {
         let mut rng = TestRng::new(13);
         let check = |wo: Vec3, wi: Vec3| {
             let (there, back) = (m.eval(wo, wi), m.eval(wi, wo));
@@ -247,9 +247,10 @@ fn no_energy_is_made_and_albedo_says_how_much_is_kept() {
             let claimed = m.it.albedo(&m.prepared, wo).to_array();
             for (kept, claimed) in kept.into_iter().zip(claimed.map(f64::from)) {
                 // 16,384 weights, stratified, that vary by less than a half: at most 0.004 off.
-                assert!(kept < 1.005, "{} {wo}: makes {kept} of 1", m.label);
+                let physical = m.it.is_physical();
+                assert!(kept < 1.005 || !physical, "{} {wo}: makes {kept} of 1", m.label);
                 // A furnace must stay white: 1 %. Elsewhere the trait promises some percent.
-                let tolerance = if claimed > 0.999 { 0.01 } else { 0.04 };
+                let tolerance = if claimed > 0.999 && physical { 0.01 } else { 0.04 * kept.max(1.0) };
                 assert!((kept - claimed).abs() < tolerance, "{} {wo}: {kept}, says {claimed}", m.label);
             }
         }
@@ -277,7 +278,8 @@ fn nothing_is_ever_nan_or_infinite() {
                     let whole = good(s.weight) && s.pdf.is_finite() && s.pdf > 0.0 && s.wi.is_finite();
                     assert!(whole && (s.wi.length() - 1.0).abs() < 1e-5, "{}: {wo} {s:?}", m.label);
                     // A path's throughput must not jump either.
-                    assert!(s.weight.max_component() < 3.0, "{}: {wo} {s:?}", m.label);
+                    let bound = if m.it.is_physical() { 3.0 } else { 30.0 };
+                    assert!(s.weight.max_component() < bound, "{}: {wo} {s:?}", m.label);
                 }
             }
             assert!(good(m.it.albedo(&m.prepared, wo)), "{}: {wo}", m.label);

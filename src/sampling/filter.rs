@@ -24,6 +24,8 @@ pub enum PixelFilter {
     },
     /// The pixel's own square.
     Box,
+    /// Nothing but the pixel's centre: edges stay jagged, as in pictures of programs that do the same.
+    Center,
     /// 1 - |x| / radius: at 1, linear interpolation.
     Tent {
         /// Half width, pixels, at least 0.
@@ -39,10 +41,11 @@ impl Default for PixelFilter {
 
 impl PixelFilter {
     /// Names as the command line and scene files spell them, each with its filter at its usual width.
-    pub const NAMES: [(&'static str, PixelFilter); 3] = [
+    pub const NAMES: [(&'static str, PixelFilter); 4] = [
         ("blackman-harris", PixelFilter::BlackmanHarris { radius: 1.5 }),
         ("box", PixelFilter::Box),
         ("tent", PixelFilter::Tent { radius: 1.0 }),
+        ("center", PixelFilter::Center),
     ];
 
     /// The name of this kind of filter.
@@ -51,6 +54,7 @@ impl PixelFilter {
             PixelFilter::BlackmanHarris { .. } => "blackman-harris",
             PixelFilter::Box => "box",
             PixelFilter::Tent { .. } => "tent",
+            PixelFilter::Center => "center",
         }
     }
 
@@ -62,6 +66,7 @@ impl PixelFilter {
             }
             PixelFilter::Box => "the pixel's own square",
             PixelFilter::Tent { .. } => "linear fall-off, half width 1 pixel",
+            PixelFilter::Center => "the pixel's centre alone, without anti-aliasing",
         }
     }
 
@@ -70,6 +75,7 @@ impl PixelFilter {
         match self {
             PixelFilter::BlackmanHarris { radius } | PixelFilter::Tent { radius } => radius,
             PixelFilter::Box => 0.5,
+            PixelFilter::Center => 0.0,
         }
     }
 
@@ -91,6 +97,7 @@ impl PixelFilter {
             }
             PixelFilter::Box => u - Vec2::splat(0.5),
             PixelFilter::Tent { radius } => Vec2::new(tent(u.x), tent(u.y)) * radius,
+            PixelFilter::Center => Vec2::ZERO,
         }
     }
 }
@@ -125,6 +132,7 @@ impl Kernel for AddOffsets<'_> {
             }
             PixelFilter::Box => all.for_each(|(p, &u)| *p += u - 0.5),
             PixelFilter::Tent { radius } => all.for_each(|(p, &u)| *p += tent(u) * radius),
+            PixelFilter::Center => {}
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::base::registry::Node;
 use crate::cameras::View;
+use crate::color::Transfer;
 use crate::error::Place;
 use glam::DAffine3;
 
@@ -46,11 +47,13 @@ pub struct Named<T> {
 pub struct FilmDesc {
     /// Width and height in pixels.
     pub size: [u32; 2],
+    /// The curve of 8-bit pictures of it.
+    pub transfer: Transfer,
 }
 
 impl Default for FilmDesc {
     fn default() -> Self {
-        FilmDesc { size: [1280, 720] }
+        FilmDesc { size: [1280, 720], transfer: Transfer::default() }
     }
 }
 

@@ -10,10 +10,12 @@ mod tree;
 mod values;
 
 use crate::base::registry::Node;
+use crate::color::Transfer;
 use crate::error::{Error, Result};
 use crate::formats::families::{Families, Kind};
 use crate::formats::files::Files;
-use crate::scene::desc::{Background, FilmDesc, Named, ObjectDesc, RenderDesc, SceneDesc, SkyDesc};
+use crate::formats::{LoadOptions, SceneFormat, SceneText};
+use crate::scene::desc::{Background, Named, ObjectDesc, RenderDesc, SceneDesc, SkyDesc};
 use nodes::NodeTable;
 use std::path::Path;
 use tree::{Data, Source, Table, Tree};
@@ -26,26 +28,31 @@ pub const MAX_SIDE: u32 = 1 << 16;
 /// Most pixels of a film.
 pub const MAX_PIXELS: u64 = 1 << 28;
 
-/// Reads a scene file and all the files it names.
+/// The native format.
+pub const FORMAT: SceneFormat = SceneFormat {
+    extension: "toml",
+    doc: "skylit's own scenes",
+    recognise: |head| {
+        // A section, or a comment before the first one, which no other format begins with.
+        let text = String::from_utf8_lossy(head);
+        let first = text.lines().map(str::trim).find(|l| !l.is_empty() && !l.starts_with('#'));
+        first.is_some_and(|l| l.starts_with('[') || l.contains('='))
+    },
+    parse: load,
+};
+
+/// Reads a scene file's text and all the files it names.
 ///
 /// # Errors
 /// [`Error::Content`] with line and column for anything in the text that cannot be used; [`Error::File`] for files that
 /// cannot be read.
-pub fn load(path: &Path, families: &Families) -> Result<SceneDesc> {
-    let length = std::fs::metadata(path).map_err(|e| Error::file(path, "open", e))?.len();
+fn load(file: &SceneText, options: &LoadOptions) -> Result<SceneDesc> {
+    let length = file.bytes.len() as u64;
     if length > MAX_BYTES {
         let message = format!("{length} bytes of scene text; {MAX_BYTES} are the most that is read");
-        return Err(Error::content(path, message));
+        return Err(Error::content(file.path, message));
     }
-    let bytes = std::fs::read(path).map_err(|e| Error::file(path, "read", e))?;
-    let text = match std::str::from_utf8(&bytes) {
-        Ok(text) => text.strip_prefix('\u{feff}').unwrap_or(text),
-        Err(e) => {
-            let line = 1 + bytes[..e.valid_up_to()].iter().filter(|b| **b == b'\n').count();
-            return Err(Error::content_at(path, line, 0, "this is not text in UTF-8"));
-        }
-    };
-    parse(path, text, families)
+    parse(file.path, file.text()?, &options.families)
 }
 
 /// Reads the text of a scene file; `path` is for messages and for the paths in it, which are relative to its folder.
@@ -123,9 +130,12 @@ impl Reader<'_, '_> {
     }
 
     fn film(&mut self, v: &Tree) -> Result<()> {
-        let section = Section::new(self.source, "[film]", v, &["size", "filter", "background"])?;
-        if let Some(film) = section.read("size", film_size)? {
-            self.scene.film = film;
+        let section = Section::new(self.source, "[film]", v, &["size", "filter", "background", "transfer"])?;
+        if let Some(size) = section.read("size", film_size)? {
+            self.scene.film.size = size;
+        }
+        if let Some(transfer) = section.read("transfer", transfer)? {
+            self.scene.film.transfer = transfer;
         }
         let filters = &self.families.filters;
         self.scene.render.filter = section.read("filter", |s, k, v| s.name_of(filters, k, v))?;
@@ -205,7 +215,7 @@ fn not_negative(source: &Source, name: &str, v: &Tree) -> Result<f64> {
     }
 }
 
-fn film_size(source: &Source, name: &str, v: &Tree) -> Result<FilmDesc> {
+fn film_size(source: &Source, name: &str, v: &Tree) -> Result<[u32; 2]> {
     let size = match source.list(name, v)? {
         [w, h] => [w, h].map(|x| source.integer(name, x, 1, i64::from(MAX_SIDE))),
         _ => return Err(source.error(v.at, format!("`{name}` takes width and height in pixels"))),
@@ -213,7 +223,27 @@ fn film_size(source: &Source, name: &str, v: &Tree) -> Result<FilmDesc> {
     let [width, height] = size;
     let size = [width? as u32, height? as u32];
     check_film(size).map_err(|m| source.error(v.at, m))?;
-    Ok(FilmDesc { size })
+    Ok(size)
+}
+
+/// Gammas that any program writes with.
+pub const GAMMAS: std::ops::RangeInclusive<f64> = 0.1..=10.0;
+
+fn transfer(source: &Source, name: &str, v: &Tree) -> Result<Transfer> {
+    match &v.data {
+        Data::Text(_) => match source.word(name, v, &["srgb", "linear"])? {
+            "linear" => Ok(Transfer::Gamma(1.0)),
+            _ => Ok(Transfer::Srgb),
+        },
+        _ => match source.number(name, v)? {
+            gamma if GAMMAS.contains(&gamma) => Ok(Transfer::Gamma(gamma as f32)),
+            gamma => {
+                let range = format!("{} to {}", GAMMAS.start(), GAMMAS.end());
+                Err(source
+                    .error(v.at, format!("`{name}` takes srgb, linear or a gamma from {range}, not {gamma}")))
+            }
+        },
+    }
 }
 
 /// Whether a film of this size can be made; else why not.

@@ -83,7 +83,7 @@ fn png_holds_the_look_through_the_srgb_curve() {
     let dir = tempfile::tempdir().expect("folder");
     let path = dir.path().join("x.PNG");
     let out = picture(40, 30);
-    let look = Look { exposure: -1.0, tonemap: ToneMap::Reinhard };
+    let look = Look { exposure: -1.0, tonemap: ToneMap::Reinhard, ..Look::default() };
     write_picture(&path, &out, &WriteOptions { look, alpha: true }).expect("writes");
     let image = read_image(&path, None).expect("reads");
     let Texels::Srgb8(texels) = &image.texels else { panic!("8 bits") };

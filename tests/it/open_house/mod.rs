@@ -11,7 +11,7 @@ mod sky;
 use crate::common::{assert_mean, integrator, mean, render};
 use skylit::base::intersectable::KernelOptions;
 use skylit::formats::families::Families;
-use skylit::formats::load_with;
+use skylit::formats::{LoadOptions, load_with};
 use skylit::scene::Scene;
 use skylit::scene::build::{BuildOptions, build_with};
 use skylit::scene::registry::Registry;
@@ -32,7 +32,8 @@ fn load(toml: &str, registry: &Registry) -> skylit::Result<skylit::scene::desc::
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("scene.toml");
     std::fs::write(&path, toml).unwrap();
-    load_with(&path, &Families::of(registry))
+    let options = LoadOptions { families: Families::of(registry), ..LoadOptions::default() };
+    load_with(&path, &options)
 }
 
 fn scene_on(backend: &str, toml: &str) -> Scene {
