@@ -80,6 +80,11 @@ pub trait Material: Send + Sync {
     /// decisions, not for radiometry.
     fn albedo(&self, m: &Prepared, wo: Vec3) -> Rgb;
 
+    /// Reflectance of the part that scatters evenly (Lambert), for closed forms; black where there is none.
+    fn diffuse(&self, _m: &Prepared) -> Rgb {
+        Rgb::BLACK
+    }
+
     /// Whether it keeps the laws: light may travel backwards, and no more leaves than arrives. The looks of some old
     /// programs do not, and say so.
     fn is_physical(&self) -> bool {
@@ -126,4 +131,6 @@ pub struct Emitter {
     pub mean: Rgb,
     /// Whether the back emits as the front does.
     pub two_sided: bool,
+    /// Whether the radiance is the same all over the surface and in all directions.
+    pub uniform: bool,
 }

@@ -4,7 +4,9 @@ use crate::base::light::{Extent, Light, LightSample, PathEnd, Receiver};
 use crate::base::material::Material;
 use crate::base::shape::Shape;
 use crate::color::Rgb;
+use crate::math::polygon::triangle_irradiance;
 use crate::sampling::distribution::Distribution1D;
+use glam::Vec3;
 use std::f32::consts::PI;
 use std::sync::Arc;
 
@@ -86,6 +88,25 @@ impl Light for AreaLight {
             Some(v) => self.material(v.prim).emission(v.uv, v.wo.dot(v.ng)),
             None => Rgb::BLACK,
         }
+    }
+
+    /// Lambert's formula over all triangles of an unvarying light: as slow as they are many.
+    fn irradiance_closed_form(&self, p: Vec3, n: Vec3) -> Option<Rgb> {
+        let mesh = self.shape.triangles()?;
+        let (p, n) = (p.as_dvec3(), n.as_dvec3());
+        let mut sum = Rgb::BLACK;
+        for prim in 0..self.shape.primitive_count() {
+            let Some(emitter) = self.material(prim).emitter() else { continue };
+            if !emitter.uniform {
+                return None;
+            }
+            let corners = mesh.corners(prim).map(|c| c.as_dvec3() - p);
+            let ng = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+            if emitter.two_sided || corners[0].dot(ng) < 0.0 {
+                sum += emitter.mean * triangle_irradiance(corners, n) as f32;
+            }
+        }
+        Some(sum)
     }
 
     fn power(&self, _extent: &Extent) -> f32 {

@@ -48,8 +48,11 @@ impl Material for Lamp {
     }
 
     fn emitter(&self) -> Option<Emitter> {
-        (self.radiance > 0.0)
-            .then_some(Emitter { mean: Rgb::splat(self.radiance), two_sided: self.two_sided })
+        (self.radiance > 0.0).then_some(Emitter {
+            mean: Rgb::splat(self.radiance),
+            two_sided: self.two_sided,
+            uniform: true,
+        })
     }
 }
 

@@ -78,6 +78,10 @@ impl Material for Diffuse {
         *m.view::<Rgb>()
     }
 
+    fn diffuse(&self, m: &Prepared) -> Rgb {
+        *m.view::<Rgb>()
+    }
+
     fn is_black(&self) -> bool {
         self.albedo.is_black()
     }

@@ -88,6 +88,10 @@ impl Material for Emissive {
         self.body.albedo(m, wo)
     }
 
+    fn diffuse(&self, m: &Prepared) -> Rgb {
+        self.body.diffuse(m)
+    }
+
     fn is_black(&self) -> bool {
         self.body.is_black()
     }
@@ -97,6 +101,7 @@ impl Material for Emissive {
     }
 
     fn emitter(&self) -> Option<Emitter> {
-        (!self.radiance.is_black()).then_some(Emitter { mean: self.radiance, two_sided: self.two_sided })
+        let Emissive { radiance, two_sided, .. } = *self;
+        (!radiance.is_black()).then_some(Emitter { mean: radiance, two_sided, uniform: true })
     }
 }

@@ -4,6 +4,7 @@ pub mod aabb;
 pub mod bounds;
 pub mod frame;
 pub mod pages;
+pub mod polygon;
 pub mod quadric;
 pub mod simd;
 pub mod triangle;
