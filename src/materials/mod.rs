@@ -3,6 +3,8 @@
 mod conductor;
 mod diffuse;
 mod emissive;
+#[allow(dead_code)]
+mod glossy;
 mod metal;
 mod microfacet;
 mod mirror;
