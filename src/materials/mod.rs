@@ -3,6 +3,7 @@
 mod conductor;
 mod diffuse;
 mod emissive;
+mod ggx;
 mod glossy;
 mod metal;
 mod microfacet;
@@ -16,7 +17,7 @@ use crate::base::registry::Row;
 
 /// Every kind of material.
 pub static REGISTRY: &[Row<dyn Material>] =
-    &[diffuse::ROW, mirror::ROW, metal::ROW, emissive::ROW, phong::ROW];
+    &[diffuse::ROW, mirror::ROW, metal::ROW, emissive::ROW, phong::ROW, ggx::ROW];
 
 #[cfg(test)]
 mod tests;
