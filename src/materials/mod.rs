@@ -1,5 +1,6 @@
 //! L2: materials, one file a kind.
 
+mod blinn_phong;
 mod conductor;
 mod diffuse;
 mod emissive;
@@ -17,7 +18,7 @@ use crate::base::registry::Row;
 
 /// Every kind of material.
 pub static REGISTRY: &[Row<dyn Material>] =
-    &[diffuse::ROW, mirror::ROW, metal::ROW, emissive::ROW, phong::ROW, ggx::ROW];
+    &[diffuse::ROW, mirror::ROW, metal::ROW, emissive::ROW, blinn_phong::ROW, phong::ROW, ggx::ROW];
 
 #[cfg(test)]
 mod tests;
