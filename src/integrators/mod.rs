@@ -8,6 +8,7 @@ pub mod normals;
 pub mod path;
 mod points;
 mod surface;
+pub mod whitted;
 
 use crate::base::hit::HitBatch;
 use crate::base::ray::RayBatch;
@@ -18,7 +19,8 @@ use crate::sampler::PixelSampler;
 use crate::scene::Scene;
 
 /// Every integrator, by name.
-pub static REGISTRY: &[Row<dyn Integrator>] = &[path::ROW, direct::ROW, ambient_occlusion::ROW, normals::ROW];
+pub static REGISTRY: &[Row<dyn Integrator>] =
+    &[path::ROW, direct::ROW, ambient_occlusion::ROW, normals::ROW, whitted::ROW];
 
 /// Which sample of which pixel a path is.
 #[derive(Debug, Clone, Copy)]
