@@ -2,6 +2,7 @@
 //! know the nouns of `base` and the [`Scene`], and name no kind of anything.
 
 pub mod ambient_occlusion;
+pub mod analytic;
 pub mod direct;
 mod escapes;
 pub mod normals;
@@ -20,7 +21,7 @@ use crate::scene::Scene;
 
 /// Every integrator, by name.
 pub static REGISTRY: &[Row<dyn Integrator>] =
-    &[path::ROW, direct::ROW, ambient_occlusion::ROW, normals::ROW, whitted::ROW];
+    &[path::ROW, direct::ROW, ambient_occlusion::ROW, normals::ROW, whitted::ROW, analytic::ROW];
 
 /// Which sample of which pixel a path is.
 #[derive(Debug, Clone, Copy)]
