@@ -67,6 +67,16 @@ impl Files {
 
     /// A picture that `place` names.
     pub fn image(&mut self, path: &str, encoding: Option<Encoding>, place: &Place) -> Result<Arc<ImageData>> {
+        self.image_at(Path::new(path), encoding, place)
+    }
+
+    /// As [`Files::image`], by a path that need not be text.
+    pub fn image_at(
+        &mut self,
+        path: &Path,
+        encoding: Option<Encoding>,
+        place: &Place,
+    ) -> Result<Arc<ImageData>> {
         let request = Request::Image(self.resolve(path, place)?, encoding == Some(Encoding::Linear));
         match self.ask(request, true) {
             Some(Content::Image(image)) => Ok(image),
@@ -81,7 +91,8 @@ impl Files {
         encoding: Option<Encoding>,
         place: &Place,
     ) -> Result<Arc<[ImageData; 6]>> {
-        let request = Request::Faces(self.resolve(path, place)?, encoding == Some(Encoding::Linear));
+        let request =
+            Request::Faces(self.resolve(Path::new(path), place)?, encoding == Some(Encoding::Linear));
         match self.ask(request, true) {
             Some(Content::Faces(faces)) => Ok(faces),
             _ => Ok(NO_FACES.clone()),
@@ -90,6 +101,11 @@ impl Files {
 
     /// A mesh that `place` names.
     pub fn mesh(&mut self, path: &str, place: &Place) -> Result<Arc<MeshData>> {
+        self.mesh_at(Path::new(path), place)
+    }
+
+    /// As [`Files::mesh`], by a path that need not be text.
+    pub fn mesh_at(&mut self, path: &Path, place: &Place) -> Result<Arc<MeshData>> {
         let request = Request::Mesh(self.resolve(path, place)?);
         match self.ask(request, true) {
             Some(Content::Mesh(mesh)) => Ok(mesh),
@@ -144,7 +160,7 @@ impl Files {
     }
 
     /// The file's one true path, so that two names of it are one file.
-    fn resolve(&self, path: &str, place: &Place) -> Result<PathBuf> {
+    fn resolve(&self, path: &Path, place: &Place) -> Result<PathBuf> {
         let full = self.folder.join(path);
         full.canonicalize().map_err(|e| {
             let hint = near_file(&full).map_or(String::new(), |n| format!("; did you mean \"{n}\"?"));

@@ -1,5 +1,6 @@
 //! L4: files to plain scene data, one file a format.
 
+mod commands;
 pub mod families;
 mod files;
 pub mod mesh_scene;

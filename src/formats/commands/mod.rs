@@ -1,0 +1,83 @@
+//! What the formats of one command a line share: statements, the transform stack, looks, and triangles on their way
+//! into meshes.
+
+pub(super) mod looks;
+pub(super) mod soup;
+pub(super) mod stack;
+pub(super) mod statements;
+
+use crate::base::registry::{Node, Param, Params, Value};
+use crate::error::{Error, Place, Result};
+use crate::formats::native::check_film;
+use crate::scene::desc::{Content, ObjectDesc};
+use glam::DAffine3;
+use statements::Statement;
+use std::path::{Path, PathBuf};
+
+/// A node made of a statement.
+pub(super) fn node(kind: &str, place: &Place, params: Vec<(&str, Value)>) -> Node {
+    let list =
+        params.into_iter().map(|(name, value)| Param { name: name.to_owned(), value, place: place.clone() });
+    let params = Params { list: list.collect(), place: place.clone() };
+    Node { kind: kind.to_owned(), params, place: place.clone() }
+}
+
+/// Three numbers as a parameter.
+pub(super) fn numbers(v: [f64; 3]) -> Value {
+    Value::Numbers(v.to_vec())
+}
+
+/// A shape of one look, placed.
+pub(super) fn object(shape: Node, material: &str, transform: DAffine3) -> ObjectDesc {
+    ObjectDesc {
+        name: String::new(),
+        place: shape.place.clone(),
+        content: Content::Shape(shape),
+        materials: vec![material.to_owned()],
+        transform,
+    }
+}
+
+/// `size W H`.
+pub(super) fn film_size(s: &mut Statement) -> Result<[u32; 2]> {
+    let size = [s.integer(1, i64::from(u32::MAX))? as u32, s.integer(1, i64::from(u32::MAX))? as u32];
+    check_film(size).map_err(|m| s.error(m))?;
+    Ok(size)
+}
+
+/// `camera EYE(3) CENTER(3) UP(3) FOV`, the vertical angle of view as the program takes it.
+pub(super) fn camera(s: &mut Statement, fov: impl Fn(f64) -> f64) -> Result<Node> {
+    let [eye, look_at, up] = [s.vector()?, s.vector()?, s.vector()?];
+    let fov_deg = fov(s.number()?);
+    let params = vec![
+        ("eye", numbers(eye)),
+        ("look_at", numbers(look_at)),
+        ("up", numbers(up)),
+        ("fov_deg", Value::Number(fov_deg)),
+    ];
+    Ok(node("perspective", &s.place(), params))
+}
+
+/// How far up from the scene's folder its files are looked for: the programs of these formats were started in a folder
+/// above it.
+const FOLDERS_UP: usize = 3;
+
+/// The file or folder that a statement names: relative to the scene's folder, or to one above it.
+pub(super) fn locate(scene: &Path, named: &str, s: &Statement) -> Result<PathBuf> {
+    locate_at(scene, named, &s.place())
+}
+
+/// As [`locate`], for a name given at `place`.
+pub(super) fn locate_at(scene: &Path, named: &str, place: &Place) -> Result<PathBuf> {
+    let folder = scene.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut tried = folder.to_owned();
+    for _ in 0..=FOLDERS_UP {
+        let path = tried.join(named);
+        if path.exists() {
+            return Ok(path);
+        }
+        tried.push("..");
+    }
+    let up = format!("{} or the {FOLDERS_UP} folders above it", folder.display());
+    Err(Error::file(Path::new(named), "open", format!("there is no such file in {up} (named at {place})")))
+}
