@@ -7,6 +7,7 @@ pub mod mesh_scene;
 pub mod native;
 pub mod obj;
 pub mod ply;
+pub mod seed;
 pub mod sky_files;
 pub mod source;
 mod triangulate;
@@ -51,7 +52,7 @@ pub struct SceneFormat {
 }
 
 /// Every format of scene files.
-pub static SCENE_FORMATS: &[SceneFormat] = &[native::FORMAT];
+pub static SCENE_FORMATS: &[SceneFormat] = &[native::FORMAT, seed::FORMAT];
 
 /// The content of a scene file.
 pub struct SceneText<'a> {
