@@ -1,6 +1,7 @@
 //! L4: files to plain scene data, one file a format.
 
 mod commands;
+pub mod cse168;
 pub mod families;
 mod files;
 pub mod mesh_scene;
@@ -52,7 +53,7 @@ pub struct SceneFormat {
 }
 
 /// Every format of scene files.
-pub static SCENE_FORMATS: &[SceneFormat] = &[native::FORMAT, seed::FORMAT];
+pub static SCENE_FORMATS: &[SceneFormat] = &[native::FORMAT, cse168::FORMAT, seed::FORMAT];
 
 /// The content of a scene file.
 pub struct SceneText<'a> {
