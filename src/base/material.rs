@@ -107,6 +107,12 @@ pub trait Material: Send + Sync {
         false
     }
 
+    /// What light that passes to the other side meets there; None if all that is scattered stays on its own side.
+    /// Lights are then asked for light from everywhere, and radiance is measured per eta^2 where it is compared.
+    fn transmission(&self) -> Option<Transmission> {
+        None
+    }
+
     /// Whether nothing leaves by scattering at all.
     fn is_black(&self) -> bool {
         false
@@ -121,6 +127,27 @@ pub trait Material: Send + Sync {
     /// Mean emitted radiance over the surface, and whether it emits from both sides; None if it emits nothing.
     fn emitter(&self) -> Option<Emitter> {
         None
+    }
+}
+
+/// A boundary that light passes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Transmission {
+    /// Refractive index below the surface (z < 0) over that above; 1 where both sides are alike, as at a sheet of paper.
+    pub eta: f32,
+}
+
+impl Transmission {
+    /// Squared index on the side of `wi` over that on the side of `wo`. Radiance that crosses a boundary without loss
+    /// changes by this factor, so f(wo, wi) times it is what f(wi, wo) is (Veach, "Robust Monte Carlo Methods for Light
+    /// Transport Simulation", 1997, 5.2).
+    #[inline]
+    pub fn eta2(&self, wo: Vec3, wi: Vec3) -> f32 {
+        match (wo.z < 0.0, wi.z < 0.0) {
+            (false, true) => self.eta * self.eta,
+            (true, false) => 1.0 / (self.eta * self.eta),
+            _ => 1.0,
+        }
     }
 }
 

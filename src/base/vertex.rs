@@ -131,6 +131,12 @@ impl Vertex {
         Receiver { p: self.p, ng: self.ng * side, ns: self.frame.n * side }
     }
 
+    /// This point as a light sees it where light from both sides counts.
+    #[inline]
+    pub fn receiver_all_round(&self) -> Receiver {
+        Receiver { p: self.p, ng: Vec3::ZERO, ns: Vec3::ZERO }
+    }
+
     /// Whether `wi` lies on the same side of the shading normal as of the geometric one. Where the two disagree,
     /// light would leak through the surface: nothing is scattered there.
     #[inline]

@@ -40,7 +40,11 @@ impl<'a> Surface<'a> {
     #[inline]
     pub fn new(scene: &'a Scene, v: Vertex, state: PathState, number: usize) -> Self {
         let material = scene.material(&v);
-        let (wo, receiver) = (v.frame.to_local(v.wo), v.receiver());
+        let wo = v.frame.to_local(v.wo);
+        let receiver = match material.transmission() {
+            None => v.receiver(),
+            Some(_) => v.receiver_all_round(),
+        };
         Surface { v, state, number, material, prepared: Prepared::default(), wo, receiver, lit: None }
     }
 }

@@ -56,10 +56,16 @@ impl Ggx {
         if l2 < 1e-24 {
             return None;
         }
+        Some(Facet { d: self.density(h, l2), cos: (0.5 * l2.sqrt()).min(1.0) })
+    }
+
+    /// Density of facets with their normal along `h`, whose squared length is `l2`, per solid angle and area.
+    #[inline]
+    pub fn density(&self, h: Vec3, l2: f32) -> f32 {
         // Walter eq. 33; anisotropic as Heitz 2018, eq. 1. The half vector need not be normalised for it.
         let (x, y) = (h.x / self.ax, h.y / self.ay);
         let q = (x * x + y * y + h.z * h.z) / l2;
-        Some(Facet { d: 1.0 / (PI * self.ax * self.ay * q * q), cos: (0.5 * l2.sqrt()).min(1.0) })
+        1.0 / (PI * self.ax * self.ay * q * q)
     }
 
     /// Length of `w` stretched by the widths: |(ax x, ay y, z)|. Everything about masking is made of it:

@@ -1,7 +1,7 @@
 //! Paper: scatters evenly to both of its sides, unlike any material of the crate.
 
 use glam::{Vec2, Vec3};
-use skylit::base::material::{BsdfEval, BsdfSample, Material, Prepared};
+use skylit::base::material::{BsdfEval, BsdfSample, Material, Prepared, Transmission};
 use skylit::base::registry::{ParamKind, ParamSpec, Params, Row, TextureOrColor, Value};
 use skylit::base::shape::Needs;
 use skylit::base::vertex::Vertex;
@@ -105,6 +105,10 @@ impl Material for Paper {
                 BsdfSample { wi, weight, pdf: (1.0 - share) * pdf, delta: false }
             }
         })
+    }
+
+    fn transmission(&self) -> Option<Transmission> {
+        Some(Transmission { eta: 1.0 })
     }
 
     fn albedo(&self, m: &Prepared, _wo: Vec3) -> Rgb {
