@@ -1,4 +1,4 @@
-//! L2: lights, one file a kind. Point and directional lights have registry rows; area lights come from emitting
+//! L2: lights, one file a kind. Point, spot and directional lights have registry rows; area lights come from emitting
 //! objects and the sky light from a skybox, so they have none.
 
 pub mod area;
@@ -6,12 +6,13 @@ mod directional;
 mod point;
 pub mod sampler;
 pub mod sky;
+mod spot;
 
 use crate::base::light::LightSource;
 use crate::base::registry::Row;
 
 /// Every kind of light that a scene may list.
-pub static REGISTRY: &[Row<dyn LightSource>] = &[point::ROW, directional::ROW];
+pub static REGISTRY: &[Row<dyn LightSource>] = &[point::ROW, spot::ROW, directional::ROW];
 
 #[cfg(test)]
 mod tests;

@@ -101,7 +101,8 @@ fn lights_have_their_closed_form_in_any_space() {
         let world = it.place(&RenderSpace::IDENTITY).expect("places");
         let render = it.place(&space).expect("places");
         let mut known = 0;
-        for _ in 0..100 {
+        // Half of all receivers turn away from a lamp, and for some lamps nothing is known of those.
+        for _ in 0..200 {
             let (p, n) = (rng.cube() * 3.0 + DVec3::splat(0.1), rng.direction());
             let Some(closed) = world.irradiance_closed_form(p.as_vec3(), n) else { continue };
             let closed = closed.luminance();
@@ -117,7 +118,7 @@ fn lights_have_their_closed_form_in_any_space() {
             // Coordinates of size 0.3 in f32 for distances from 0.002 on.
             assert!((a - b).abs() <= 1e-3 * a + 1e-5, "{label}: {a} {b}");
         }
-        assert!(known > 50, "{label}: the closed form is known of {known} of 100 receivers");
+        assert!(known > 50, "{label}: the closed form is known of {known} of 200 receivers");
         assert!(world.power(&EXTENT) > 0.0);
     }
 }
