@@ -21,11 +21,22 @@ pub(super) const ROW: Row<dyn LightSource> = Row {
             default: Some("1"),
             doc: "radiant intensity, W/sr: irradiance at one metre",
         },
+        ParamSpec {
+            name: "attenuation",
+            kind: ParamKind::Vector,
+            default: Some("[0, 0, 1]"),
+            doc: "[c, l, q]: intensity / (c + l d + q d^2) arrives at d metres; light has [0, 0, 1]",
+        },
     ],
     build: |p| {
+        let attenuation = p.vector_or("attenuation", INVERSE_SQUARE)?;
+        if attenuation.iter().any(|a| *a < 0.0) || attenuation == [0.0; 3] {
+            return Err(p.error("attenuation", "takes numbers of at least 0, one of them more"));
+        }
         Ok(Arc::new(PointSource {
             position: DVec3::from_array(p.vector_or("position", [0.0; 3])?),
             intensity: p.color_or("intensity", [1.0; 3])?,
+            attenuation,
         }))
     },
     samples: || {
@@ -34,13 +45,21 @@ pub(super) const ROW: Row<dyn LightSource> = Row {
             Params::new()
                 .with("position", Value::Numbers(vec![3.0, 3.0, -1.0]))
                 .with("intensity", Value::Numbers(vec![10.0, 0.0, 2.5])),
+            Params::new()
+                .with("position", Value::Numbers(vec![0.0, 2.0, 0.0]))
+                .with("attenuation", Value::Numbers(vec![0.5, 0.25, 2.0])),
+            Params::new().with("attenuation", Value::Numbers(vec![1.0, 0.0, 0.0])),
         ]
     },
 };
 
+/// How light falls off with distance: as [c, l, q] of the row.
+const INVERSE_SQUARE: [f64; 3] = [0.0, 0.0, 1.0];
+
 struct PointSource {
     position: DVec3,
     intensity: Rgb,
+    attenuation: [f64; 3],
 }
 
 impl LightSource for PointSource {
@@ -53,7 +72,10 @@ impl LightSource for PointSource {
                 self.position
             )));
         }
-        Ok(Arc::new(PointLight { position, intensity }))
+        // By distances in render units, and over an intensity in render units: both have the square of the scale.
+        let [c, l, q] = self.attenuation;
+        let attenuation = [c * space.scale * space.scale, l * space.scale, q];
+        Ok(Arc::new(PointLight { position, intensity, attenuation }))
     }
 }
 
@@ -61,12 +83,22 @@ impl LightSource for PointSource {
 struct PointLight {
     position: Vec3,
     intensity: Rgb,
+    attenuation: [f64; 3],
+}
+
+impl PointLight {
+    /// What the intensity is divided by at this distance.
+    #[inline]
+    fn attenuation(&self, dist: f64) -> f64 {
+        let [c, l, q] = self.attenuation;
+        c + l * dist + q * (dist * dist)
+    }
 }
 
 impl Light for PointLight {
     fn sample_li(&self, at: &Receiver, _u: [f32; 2]) -> Option<LightSample> {
         let (wi, dist) = (self.position.as_dvec3() - at.p.as_dvec3()).normalize_and_length();
-        let li = self.intensity * (1.0 / (dist * dist)) as f32;
+        let li = self.intensity * (1.0 / self.attenuation(dist)) as f32;
         // At the light itself there is no direction to it.
         (dist > 0.0 && li.is_finite() && !li.is_black()).then(|| LightSample {
             wi: wi.as_vec3(),
@@ -85,13 +117,48 @@ impl Light for PointLight {
         Rgb::BLACK
     }
 
-    fn power(&self, _extent: &Extent) -> f32 {
-        4.0 * PI * self.intensity.luminance()
+    fn power(&self, extent: &Extent) -> f32 {
+        // Of the lamp with the inverse square that is as bright at the scene's radius: all there is for other laws.
+        let r = f64::from(extent.radius);
+        4.0 * PI * self.intensity.luminance() * (r * r / self.attenuation(r)) as f32
     }
 
     fn irradiance_closed_form(&self, p: Vec3, n: Vec3) -> Option<Rgb> {
         let to = self.position - p;
-        let d2 = to.length_squared();
-        Some(self.intensity * (n.dot(to).max(0.0) / (d2 * d2.sqrt())))
+        let dist = to.length();
+        Some(self.intensity * (n.dot(to).max(0.0) / dist / self.attenuation(f64::from(dist)) as f32))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn attenuation_goes_by_metres() {
+        let space = RenderSpace { center: DVec3::new(5.0, 0.0, 0.0), scale: 0.05 };
+        let p = Params::new()
+            .with("intensity", Value::Number(12.0))
+            .with("attenuation", Value::Numbers(vec![1.0, 0.5, 0.25]));
+        let light = (ROW.build)(&p).expect("builds").place(&space).expect("places");
+        let at = |d: f64| {
+            let p = space.point(DVec3::new(0.0, 0.0, d)).as_vec3();
+            let at = Receiver { p, ng: Vec3::ZERO, ns: Vec3::ZERO };
+            light.sample_li(&at, [0.0; 2]).expect("arrives").li.expect("known").r
+        };
+        for d in [0.5, 4.0, 30.0] {
+            let expected = 12.0 / (1.0 + 0.5 * d + 0.25 * d * d);
+            // Coordinates of size 0.25 in f32 for distances of 0.025.
+            assert!((f64::from(at(d)) / expected - 1.0).abs() < 1e-5, "{d}: {}", at(d));
+        }
+    }
+
+    #[test]
+    fn no_attenuation_and_negative_ones_are_refused() {
+        for a in [[0.0; 3], [-0.1, 0.0, 1.0], [0.0, 0.0, -1.0]] {
+            let p = Params::new().with("attenuation", Value::Numbers(a.to_vec()));
+            let error = (ROW.build)(&p).err().expect("is refused").to_string();
+            assert!(error.contains("`attenuation`"), "{error}");
+        }
     }
 }
