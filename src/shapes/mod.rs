@@ -4,6 +4,7 @@ mod cuboid;
 pub mod ellipsoid;
 pub mod generated;
 pub mod mesh;
+mod quad;
 pub mod quadric;
 mod rectangle;
 pub mod sphere;
@@ -18,6 +19,7 @@ pub static REGISTRY: &[Row<dyn ShapeSource>] = &[
     ellipsoid::ROW,
     cuboid::ROW,
     rectangle::ROW,
+    quad::ROW,
     generated::DISPLACED_SPHERE,
     generated::KNOT,
     generated::TERRAIN,
