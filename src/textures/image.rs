@@ -18,9 +18,9 @@ pub(super) const ROW: Row<dyn Texture> = Row {
         ParamSpec { name: "path", kind: ParamKind::Image, default: None, doc: "the picture's file" },
         ParamSpec {
             name: "filter",
-            kind: ParamKind::Choice(&["bilinear", "trilinear"]),
+            kind: ParamKind::Choice(&["bilinear", "trilinear", "nearest"]),
             default: Some("bilinear"),
-            doc: "trilinear also averages over the ray's footprint, for a third more memory",
+            doc: "trilinear also averages over the ray's footprint, for a third more memory; nearest blends nothing",
         },
         ParamSpec {
             name: "wrap",
@@ -73,6 +73,22 @@ fn samples() -> Vec<Params> {
         Params::new()
             .with("path", image(1, 1, Texels::Srgb8(vec![[255, 128, 0, 0]])))
             .with("encoding", Value::Text("linear".into())),
+        Params::new()
+            .with("path", image(6, 7, Texels::Linear8(bytes(6, 7))))
+            .with("filter", Value::Text("nearest".into()))
+            .with("wrap", Value::Text("mirror".into()))
+            .with("uv_scale", Value::Numbers(vec![-2.25, 1.5]))
+            .with("uv_offset", Value::Numbers(vec![0.4, -3.3])),
+        Params::new()
+            .with("path", image(5, 3, Texels::Srgb8(bytes(5, 3))))
+            .with("filter", Value::Text("nearest".into()))
+            .with("wrap", Value::Text("clamp".into()))
+            .with("uv_scale", Value::Number(1.75))
+            .with("uv_offset", Value::Number(-0.5)),
+        Params::new()
+            .with("path", image(5, 3, Texels::Srgb8(bytes(5, 3))))
+            .with("filter", Value::Text("nearest".into()))
+            .with("uv_offset", Value::Number(0.3)),
     ]
 }
 
@@ -82,6 +98,15 @@ enum Wrap {
     Repeat,
     Clamp,
     Mirror,
+}
+
+/// How texels become a surface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Blend {
+    /// Linearly between the centres of neighbours.
+    Linear,
+    /// Not at all: each texel fills its own square.
+    None,
 }
 
 /// Two neighbouring texels along an axis and the weight of the second.
@@ -99,16 +124,28 @@ fn floor(x: f32) -> f32 {
 }
 
 impl Wrap {
-    /// The texels around `s`, of `n` that span [0, 1]. Any `s` is allowed, even NaN, which counts as 0.
+    /// Where `s` falls among `n` texels that span [0, 1], in [0, n]. Any `s` is allowed, even NaN, which counts as 0.
     #[inline]
-    fn tap(self, s: f32, n: usize) -> Tap {
+    fn position(self, s: f32, n: usize) -> f32 {
         let s = match self {
             Wrap::Repeat => s - floor(s),
             Wrap::Clamp => s,
             Wrap::Mirror => (s - 2.0 * floor(0.5 * s + 0.5)).abs(),
         };
         // `max` turns NaN into 0, where `clamp` would keep it.
-        let x = (s.max(0.0) * n as f32).min(n as f32) - 0.5;
+        (s.max(0.0) * n as f32).min(n as f32)
+    }
+
+    /// The texel that `s` falls on.
+    #[inline]
+    fn nearest(self, s: f32, n: usize) -> usize {
+        (self.position(s, n) as usize).min(n - 1)
+    }
+
+    /// The texels around `s`.
+    #[inline]
+    fn tap(self, s: f32, n: usize) -> Tap {
+        let x = self.position(s, n) - 0.5;
         let low = floor(x);
         let i = low as i32;
         let last = n - 1;
@@ -121,10 +158,10 @@ impl Wrap {
     }
 
     /// Adds to `weights` what each of the texels that span [0, 1] contributes to the integral from `a` to `b`.
-    fn integrate(self, a: f64, b: f64, weights: &mut [f64]) {
+    fn integrate(self, a: f64, b: f64, blend: Blend, weights: &mut [f64]) {
         let n = weights.len();
-        // Between the centres of neighbours the filter is linear, so that the middle of a stretch stands for all
-        // of it; whole periods count each texel alike.
+        // Between the centres of neighbours (without blending: between their edges) the filter is linear, so that the
+        // middle of a stretch stands for all of it; whole periods count each texel alike.
         let (mut a, mut b) = (a, b);
         match self {
             Wrap::Repeat | Wrap::Mirror => {
@@ -141,13 +178,20 @@ impl Wrap {
                 (a, b) = (a.clamp(0.0, 1.0), b.clamp(0.0, 1.0));
             }
         }
+        let knot = if blend == Blend::Linear { 0.5 } else { 0.0 };
         let mut from = a;
         while from < b {
-            let next = ((from * n as f64 - 0.5).floor() + 1.5) / n as f64;
+            let next = ((from * n as f64 - knot).floor() + 1.0 + knot) / n as f64;
             let to = if next > from { next.min(b) } else { b };
-            let tap = self.tap((0.5 * (from + to)) as f32, n);
-            weights[tap.i0] += (to - from) * (1.0 - tap.f as f64);
-            weights[tap.i1] += (to - from) * tap.f as f64;
+            let middle = (0.5 * (from + to)) as f32;
+            match blend {
+                Blend::Linear => {
+                    let tap = self.tap(middle, n);
+                    weights[tap.i0] += (to - from) * (1.0 - tap.f as f64);
+                    weights[tap.i1] += (to - from) * tap.f as f64;
+                }
+                Blend::None => weights[self.nearest(middle, n)] += to - from,
+            }
             from = to;
         }
     }
@@ -176,11 +220,24 @@ impl Level {
         };
         a.lerp(b, x.f).lerp(c.lerp(d, x.f), y.f)
     }
+
+    #[inline]
+    fn nearest(&self, s: Vec2, wrap: Wrap) -> Rgb {
+        let (w, h) = (self.image.width, self.image.height);
+        let i = (h - 1 - wrap.nearest(s.y, h)) * w + wrap.nearest(s.x, w);
+        match &self.image.texels {
+            Texels::Srgb8(t) | Texels::Linear8(t) => {
+                Rgb::from([0, 1, 2].map(|c| self.curve[t[i][c] as usize]))
+            }
+            Texels::F32(t) => Rgb::from(t[i]),
+        }
+    }
 }
 
 struct ImageTexture {
     /// The picture, then each half the size of the one before; one alone unless trilinear.
     levels: Vec<Level>,
+    blend: Blend,
     wrap: Wrap,
     scale: Vec2,
     offset: Vec2,
@@ -207,7 +264,9 @@ impl ImageTexture {
             _ => Wrap::Repeat,
         };
         let mut levels = vec![Level { image: image.clone(), curve }];
-        if p.text_or("filter", "bilinear")? == "trilinear" {
+        let filter = p.text_or("filter", "bilinear")?;
+        let blend = if filter == "nearest" { Blend::None } else { Blend::Linear };
+        if filter == "trilinear" {
             levels.extend(mip::chain(&image, curve).into_iter().map(|image| Level { image, curve }));
         }
         let pair = |name: &str, default: f64| -> Result<Vec2> {
@@ -221,7 +280,7 @@ impl ImageTexture {
         if scale.x == 0.0 || scale.y == 0.0 {
             return Err(p.error("uv_scale", "must not be 0"));
         }
-        Ok(ImageTexture { levels, wrap, scale, offset, mean: OnceLock::new() })
+        Ok(ImageTexture { levels, blend, wrap, scale, offset, mean: OnceLock::new() })
     }
 
     /// The exact integral of the filtered picture over the unit square of uv.
@@ -229,7 +288,7 @@ impl ImageTexture {
         let axis = |scale: f32, offset: f32, n: usize| {
             let (a, b) = (offset as f64, offset as f64 + scale as f64);
             let mut weights = vec![0.0; n];
-            self.wrap.integrate(a.min(b), a.max(b), &mut weights);
+            self.wrap.integrate(a.min(b), a.max(b), self.blend, &mut weights);
             weights.iter_mut().for_each(|w| *w /= scale.abs() as f64);
             weights
         };
@@ -255,6 +314,9 @@ impl ImageTexture {
 impl Texture for ImageTexture {
     fn eval(&self, uv: Vec2, footprint: f32) -> Rgb {
         let s = uv * self.scale + self.offset;
+        if self.blend == Blend::None {
+            return self.levels[0].nearest(s, self.wrap);
+        }
         let last = self.levels.len() - 1;
         if last == 0 || footprint <= 0.0 {
             return self.levels[0].bilinear(s, self.wrap);
@@ -302,6 +364,19 @@ mod tests {
         assert_eq!(at(0.75, 0.25), [1.0, 1.0, 1.0]);
         assert_eq!(at(0.5, 0.75), [0.5, 0.5, 0.0]);
         assert_eq!(at(0.5, 0.5), [0.5, 0.5, 0.5]);
+    }
+
+    #[test]
+    fn nearest_shows_whole_texels() {
+        let t = texture(&[("filter", Value::Text("nearest".into()))]);
+        let at = |u, v| t.eval(Vec2::new(u, v), 0.3).to_array();
+        for (u, v) in [(0.0, 0.5), (0.49, 0.99), (0.25, 0.75), (1.0, 0.75)] {
+            assert_eq!(at(u, v), [1.0, 0.0, 0.0], "{u} {v}");
+        }
+        assert_eq!(at(0.5, 0.5), [0.0, 1.0, 0.0]);
+        assert_eq!(at(0.999, 0.499), [1.0, 1.0, 1.0]);
+        assert_eq!(at(-0.75, -0.75), [0.0, 0.0, 1.0]);
+        assert!(!t.uses_footprint());
     }
 
     #[test]
