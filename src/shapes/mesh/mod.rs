@@ -28,6 +28,12 @@ pub const ROW: Row<dyn ShapeSource> = Row {
             default: Some("file"),
             doc: "shading normals: the file's (flat where it has none), computed, or none",
         },
+        ParamSpec {
+            name: "missing_uv",
+            kind: ParamKind::Choice(&["square", "barycentric"]),
+            default: Some("square"),
+            doc: "uv of each triangle if the file has none: (0,0) (1,0) (1,1) at its corners, or (0,0) (1,0) (0,1)",
+        },
     ],
     build: |p| {
         let normals = match p.text_or("normals", "file")? {
@@ -35,7 +41,11 @@ pub const ROW: Row<dyn ShapeSource> = Row {
             "flat" => Normals::Flat,
             _ => Normals::File,
         };
-        Ok(Arc::new(MeshSource::new(p.mesh("path")?, normals)))
+        let missing_uv = match p.text_or("missing_uv", "square")? {
+            "barycentric" => MissingUv::Barycentric,
+            _ => MissingUv::Square,
+        };
+        Ok(Arc::new(MeshSource { missing_uv, ..MeshSource::new(p.mesh("path")?, normals) }))
     },
     samples,
 };
@@ -52,17 +62,28 @@ pub enum Normals {
     Flat,
 }
 
+/// What a triangle of a mesh without texture coordinates has instead.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum MissingUv {
+    /// Half of a picture (pbrt's choice).
+    #[default]
+    Square,
+    /// The weights of the second and third corner.
+    Barycentric,
+}
+
 /// A mesh before it is placed.
 pub struct MeshSource {
     data: Arc<MeshData>,
     normals: Normals,
+    missing_uv: MissingUv,
     bounds: OnceLock<DAabb>,
 }
 
 impl MeshSource {
     /// A mesh with a choice of shading normals.
     pub fn new(data: Arc<MeshData>, normals: Normals) -> Self {
-        MeshSource { data, normals, bounds: OnceLock::new() }
+        MeshSource { data, normals, missing_uv: MissingUv::default(), bounds: OnceLock::new() }
     }
 }
 
@@ -76,11 +97,14 @@ impl ShapeSource for MeshSource {
     }
 
     fn place(self: Arc<Self>, to_group: &DAffine3) -> Result<Placed> {
-        let (normals, data) = match Arc::try_unwrap(self) {
-            Ok(own) => (own.normals, own.data),
-            Err(shared) => (shared.normals, shared.data.clone()),
+        let (normals, missing_uv) = (self.normals, self.missing_uv);
+        let data = match Arc::try_unwrap(self) {
+            Ok(own) => own.data,
+            Err(shared) => shared.data.clone(),
         };
-        place::place(place::Parts::from_shared(data, normals), normals, to_group)
+        let placed = place::place(place::Parts::from_shared(data, normals), normals, to_group)?;
+        let shape = Arc::new(placed.shape.with_missing_uv(missing_uv, to_group));
+        Ok(Placed { shape, dropped: placed.dropped })
     }
 
     fn describe(&self) -> String {
@@ -105,12 +129,14 @@ fn samples() -> Vec<Params> {
     let far = corners.map(|c| [f64::from(c[0]) + 4e6, f64::from(c[1]) - 5e5, f64::from(c[2])]);
     let far = MeshData { positions: Positions::F64(far.to_vec()), ..tetrahedron.clone() };
     let ball = octahedron_ball(3);
+    let bare = MeshData { uvs: Vec::new(), ..tetrahedron.clone() };
     let given = |m: MeshData| Params::new().with("path", Value::Mesh(Arc::new(m)));
     vec![
         given(tetrahedron),
         given(far).with("normals", Value::Text("smooth".into())),
         given(ball.clone()),
         given(ball).with("normals", Value::Text("flat".into())),
+        given(bare).with("missing_uv", Value::Text("barycentric".into())),
     ]
 }
 
@@ -142,3 +168,6 @@ fn octahedron_ball(levels: u32) -> MeshData {
         repairs: Default::default(),
     }
 }
+
+#[cfg(test)]
+mod tests;

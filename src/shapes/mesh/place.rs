@@ -6,7 +6,7 @@ use super::smooth::smooth_normals;
 use crate::base::mesh::TriangleMesh;
 use crate::base::mesh_data::{MeshData, Positions};
 use crate::base::ray::MAX_COORDINATE;
-use crate::base::shape::{Dropped, Placed};
+use crate::base::shape::Dropped;
 use crate::error::{Error, Result};
 use crate::math::aabb::{Aabb, DAabb};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
@@ -90,15 +90,23 @@ pub fn support(data: &MeshData, directions: &[DVec3]) -> Vec<f64> {
     data.indices.par_chunks(GRAIN).map(of).reduce(none, larger)
 }
 
+/// A mesh in its group, and what was left out.
+pub struct PlacedMesh {
+    /// The mesh.
+    pub shape: MeshShape,
+    /// What was left out.
+    pub dropped: Dropped,
+}
+
 /// Carries a mesh into its group and drops what is no triangle there.
-pub fn place(parts: Parts, normals: Normals, to_group: &DAffine3) -> Result<Placed> {
+pub fn place(parts: Parts, normals: Normals, to_group: &DAffine3) -> Result<PlacedMesh> {
     let (mut mesh, slots) = carry(parts, normals, to_group)?;
     let dropped = drop_invalid(&mut mesh, slots);
     if normals == Normals::Smooth {
         mesh.normals = smooth_normals(&mesh);
     }
     let bounds = single_bounds(&mesh);
-    Ok(Placed { shape: Arc::new(MeshShape::new(mesh, bounds)), dropped })
+    Ok(PlacedMesh { shape: MeshShape::new(mesh, bounds), dropped })
 }
 
 /// A placed mesh after another map, with all of its triangles and their numbers; some may have lost their area.

@@ -1,5 +1,6 @@
 //! A placed triangle mesh.
 
+use super::MissingUv;
 use super::place::transformed;
 use super::refine::{Triangle, TrianglePoint, intersect, test_error};
 use super::sample;
@@ -14,12 +15,20 @@ use std::sync::Arc;
 pub struct MeshShape {
     mesh: TriangleMesh,
     bounds: Aabb,
+    missing_uv: MissingUv,
+    /// Whether placing exchanged the last two corners of each triangle.
+    mirrored: bool,
 }
 
 impl MeshShape {
     /// From a mesh that holds what [`TriangleMesh`] promises, and its bounds.
     pub(super) fn new(mesh: TriangleMesh, bounds: Aabb) -> Self {
-        MeshShape { mesh, bounds }
+        MeshShape { mesh, bounds, missing_uv: MissingUv::default(), mirrored: false }
+    }
+
+    /// With another choice of uv where there are none, for a mesh in source order before it was placed by `by`.
+    pub(super) fn with_missing_uv(self, missing_uv: MissingUv, by: &DAffine3) -> Self {
+        MeshShape { missing_uv, mirrored: by.matrix3.determinant() < 0.0, ..self }
     }
 
     #[inline]
@@ -29,12 +38,19 @@ impl MeshShape {
 
     #[inline]
     fn corner_uvs(&self, prim: u32) -> [DVec2; 3] {
+        if self.mesh.uvs.is_empty() {
+            return match (self.missing_uv, self.mirrored) {
+                (MissingUv::Square, _) => [DVec2::ZERO, DVec2::X, DVec2::ONE],
+                (MissingUv::Barycentric, false) => [DVec2::ZERO, DVec2::X, DVec2::Y],
+                (MissingUv::Barycentric, true) => [DVec2::ZERO, DVec2::Y, DVec2::X],
+            };
+        }
         self.mesh.indices[prim as usize].map(|i| Vec2::from_array(self.mesh.uvs[i as usize]).as_dvec2())
     }
 
     #[inline]
     fn uv(&self, prim: u32, b1: f64, b2: f64) -> Vec2 {
-        let [p, q, r] = if self.mesh.uvs.is_empty() { DEFAULT_UVS } else { self.corner_uvs(prim) };
+        let [p, q, r] = self.corner_uvs(prim);
         (p + (q - p) * b1 + (r - p) * b2).as_vec2()
     }
 }
@@ -128,7 +144,7 @@ impl Shape for MeshShape {
         }
         if needs.uv || needs.tangents {
             surface.uv = self.uv(prim, b1, b2);
-            let uv = if self.mesh.uvs.is_empty() { DEFAULT_UVS } else { self.corner_uvs(prim) };
+            let uv = self.corner_uvs(prim);
             [surface.dpdu, surface.dpdv] = tangents(uv, triangle.e1, triangle.e2);
         }
         surface
@@ -152,7 +168,8 @@ impl Shape for MeshShape {
     }
 
     fn transformed(&self, by: &DAffine3) -> Result<Arc<dyn Shape>> {
-        Ok(Arc::new(transformed(&self.mesh, by)?))
+        let mirrored = self.mirrored != (by.matrix3.determinant() < 0.0);
+        Ok(Arc::new(MeshShape { missing_uv: self.missing_uv, mirrored, ..transformed(&self.mesh, by)? }))
     }
 
     fn memory(&self) -> u64 {
@@ -163,6 +180,3 @@ impl Shape for MeshShape {
         format!("mesh, {} triangles", self.mesh.indices.len())
     }
 }
-
-/// What a triangle without uvs has: half of a picture (pbrt's choice for meshes without).
-const DEFAULT_UVS: [DVec2; 3] = [DVec2::ZERO, DVec2::X, DVec2::ONE];
