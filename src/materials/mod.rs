@@ -2,6 +2,7 @@
 
 mod blinn_phong;
 mod conductor;
+mod dielectric;
 mod diffuse;
 mod emissive;
 mod ggx;
@@ -17,8 +18,16 @@ use crate::base::material::Material;
 use crate::base::registry::Row;
 
 /// Every kind of material.
-pub static REGISTRY: &[Row<dyn Material>] =
-    &[diffuse::ROW, mirror::ROW, metal::ROW, emissive::ROW, blinn_phong::ROW, phong::ROW, ggx::ROW];
+pub static REGISTRY: &[Row<dyn Material>] = &[
+    diffuse::ROW,
+    mirror::ROW,
+    metal::ROW,
+    dielectric::ROW,
+    emissive::ROW,
+    blinn_phong::ROW,
+    phong::ROW,
+    ggx::ROW,
+];
 
 #[cfg(test)]
 mod tests;
