@@ -1,5 +1,6 @@
 //! Surface area of an ellipsoid.
 
+use super::tangent::eigen;
 use glam::DMat3;
 use std::f64::consts::PI;
 
@@ -7,7 +8,7 @@ use std::f64::consts::PI;
 /// values are ab, bc and ca for semi-axes a, b, c: 4 pi R_G(a^2 b^2, b^2 c^2, c^2 a^2) (Carlson, "Numerical
 /// computation of real or complex elliptic integrals", 1995; DLMF 19.33.1). Good to about 1e-14.
 pub fn ellipsoid(cofactor: &DMat3) -> f64 {
-    let mut e = eigenvalues(cofactor.transpose() * *cofactor);
+    let (mut e, _) = eigen(cofactor.transpose() * *cofactor);
     e.sort_by(f64::total_cmp);
     let largest = e[2];
     // Relative to the largest, so that nothing over- or underflows; a value lost to rounding counts as flat.
@@ -64,25 +65,6 @@ fn carlson_rd(mut x: f64, mut y: f64, mut z: f64) -> f64 {
         factor /= 4.0;
         (x, y, z) = ((x + lambda) / 4.0, (y + lambda) / 4.0, (z + lambda) / 4.0);
     }
-}
-
-/// Eigenvalues of a symmetric matrix by Jacobi's rotations.
-fn eigenvalues(mut a: DMat3) -> [f64; 3] {
-    // Converges quadratically: a handful of sweeps suffices for any input.
-    for sweep in 0..30 {
-        let (p, q) = [(0, 1), (0, 2), (1, 2)][sweep % 3];
-        let off = a.col(p)[q];
-        if off != 0.0 {
-            let theta = 0.5 * (2.0 * off).atan2(a.col(q)[q] - a.col(p)[p]);
-            let mut r = DMat3::IDENTITY;
-            r.col_mut(p)[p] = theta.cos();
-            r.col_mut(q)[q] = theta.cos();
-            r.col_mut(q)[p] = theta.sin();
-            r.col_mut(p)[q] = -theta.sin();
-            a = r.transpose() * a * r;
-        }
-    }
-    [a.x_axis.x, a.y_axis.y, a.z_axis.z]
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 mod area;
 mod sample;
+mod tangent;
 
 use crate::base::ray::MAX_COORDINATE;
 use crate::base::shape::{Dropped, LocalRay, Needs, Placed, Shape, ShapeSample, ShapeSource, Surface};
