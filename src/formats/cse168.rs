@@ -1,10 +1,9 @@
 //! Scenes of a course on rendering (CSE 168 of the University of California, San Diego; `.test`): one command a line
 //! and a stack of transforms, from classic ray tracing to path tracing with multiple importance sampling.
 //!
-//! Pictures hold linear values, unless `gamma` says otherwise. `lightsamples` of an aliased picture are taken as samples
-//! of the pixel's centre: the same estimate from the same number of shadow rays. Area lights of the path-traced scenes
-//! are combined with the material's samples wherever light is sampled at all; `nexteventestimation on` differs from `mis` in its
-//! noise alone.
+//! Pictures hold linear values, unless `gamma` says otherwise. Where the program sends shadow rays to every light, ours
+//! sends one to one of them, so samples are multiplied by the number of lights; `lightsamples` of an aliased picture are
+//! samples of the pixel's centre. Both are the same estimate from the same number of shadow rays.
 
 use super::commands::looks::{Look, Looks};
 use super::commands::soup::Soup;
@@ -75,6 +74,17 @@ enum Integrator {
     PathTracer,
 }
 
+/// How light that comes straight from lamps is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum NextEvent {
+    /// By chance.
+    Off,
+    /// By samples of the lamps alone.
+    On,
+    /// By both, combined.
+    Mis,
+}
+
 /// Reads one text from top to bottom.
 struct Reader<'a> {
     path: &'a Path,
@@ -92,7 +102,8 @@ struct Reader<'a> {
     max_depth: i64,
     spp: u32,
     light_samples: u32,
-    light_sampling: bool,
+    quad_lights: u32,
+    next_event: NextEvent,
     roulette: bool,
     sampling: &'static str,
     /// Width of GGX lobes, wherever `brdf ggx` holds.
@@ -122,7 +133,8 @@ impl<'a> Reader<'a> {
             max_depth: 5,
             spp: 1,
             light_samples: 1,
-            light_sampling: false,
+            quad_lights: 0,
+            next_event: NextEvent::Off,
             roulette: false,
             sampling: "hemisphere",
             roughness: 1.0,
@@ -183,7 +195,13 @@ impl<'a> Reader<'a> {
             "lightsamples" => self.light_samples = s.integer(1, 1 << 20)? as u32,
             // Our points are stratified either way.
             "lightstratify" => drop(s.choice(&["on", "off"])?),
-            "nexteventestimation" => self.light_sampling = s.choice(&["on", "off", "mis"])? != "off",
+            "nexteventestimation" => {
+                self.next_event = match s.choice(&["on", "off", "mis"])? {
+                    "on" => NextEvent::On,
+                    "mis" => NextEvent::Mis,
+                    _ => NextEvent::Off,
+                }
+            }
             "russianroulette" => self.roulette = s.choice(&["on", "off"])? == "on",
             "importancesampling" => self.sampling = s.choice(&["hemisphere", "cosine", "brdf"])?,
             "brdf" => {
@@ -258,7 +276,8 @@ impl<'a> Reader<'a> {
         if a.cross(b).length_squared() == 0.0 {
             return Err(s.error("the edges of a `quadLight` are parallel: it has no area"));
         }
-        let name = format!("light {}", self.scene.materials.len() + 1);
+        self.quad_lights += 1;
+        let name = format!("light {}", self.quad_lights);
         let value = node("emissive", &place, vec![("radiance", numbers(color))]);
         self.scene.materials.push(crate::scene::desc::Named {
             name: name.clone(),
@@ -285,11 +304,13 @@ impl<'a> Reader<'a> {
         let place = Place { path: self.path.to_owned(), ..Place::default() };
         self.scene.render.integrator = Some(self.integrator_node(&place));
         let render = &mut self.scene.render;
-        let samples = match self.integrator {
-            Integrator::Direct => self.spp.saturating_mul(self.light_samples),
+        // Their samples ask every light, ours one of them.
+        let lights = self.quad_lights.max(1);
+        render.spp = Some(match self.integrator {
+            Integrator::Direct => self.spp.saturating_mul(self.light_samples).saturating_mul(lights),
+            Integrator::PathTracer if self.next_event != NextEvent::Off => self.spp.saturating_mul(lights),
             _ => self.spp,
-        };
-        render.spp = Some(samples);
+        });
         // One ray a pixel goes through its centre, however many samples of the light there are.
         render.filter = Some(if self.spp == 1 { "center" } else { "box" }.into());
         Ok(self.scene)
@@ -308,12 +329,15 @@ impl<'a> Reader<'a> {
             Integrator::AnalyticDirect => node("analytic", place, Vec::new()),
             Integrator::Direct => node("direct", place, Vec::new()),
             Integrator::PathTracer => {
-                let depth = if unlimited { 4096 } else { self.max_depth.max(1) };
+                // Where light is found by chance alone, the lamp's own surface is one of those counted.
+                let found = i64::from(self.next_event == NextEvent::Off);
+                let depth = if unlimited { 4096 } else { (self.max_depth - found).max(1) };
                 let roulette = if self.roulette || unlimited { 2 } else { 4097 };
                 let params = vec![
                     number("max_depth", depth),
                     number("roulette_depth", roulette),
-                    ("light_sampling", Value::Bool(self.light_sampling)),
+                    ("light_sampling", Value::Bool(self.next_event != NextEvent::Off)),
+                    ("mis", Value::Bool(self.next_event != NextEvent::On)),
                 ];
                 node("path", place, params)
             }

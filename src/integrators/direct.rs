@@ -12,7 +12,7 @@ pub const ROW: Row<dyn Integrator> = Row {
     params: &[LIGHT_SAMPLING],
     build: |p| {
         let light_sampling = p.bool_or("light_sampling", true)?;
-        Ok(Arc::new(PathTracer { max_depth: 1, roulette_depth: u32::MAX, light_sampling }))
+        Ok(Arc::new(PathTracer { max_depth: 1, roulette_depth: u32::MAX, light_sampling, mis: true }))
     },
     samples: || vec![Params::new()],
 };

@@ -36,9 +36,18 @@ pub const ROW: Row<dyn Integrator> = Row {
             doc: "first depth at which Russian roulette may end a path",
         },
         LIGHT_SAMPLING,
+        ParamSpec {
+            name: "mis",
+            kind: ParamKind::Bool,
+            default: Some("true"),
+            doc: "weigh light samples against scattered rays; false counts light samples alone wherever there are any",
+        },
     ],
     build: |p| Ok(Arc::new(PathTracer::from_params(p)?)),
-    samples: || vec![Params::new(), Params::new().with("light_sampling", Value::Bool(false))],
+    samples: || {
+        let off = |name| Params::new().with(name, Value::Bool(false));
+        vec![Params::new(), off("light_sampling"), off("mis")]
+    },
 };
 
 /// Shared with `direct`.
@@ -57,6 +66,8 @@ pub struct PathTracer {
     pub roulette_depth: u32,
     /// See the row.
     pub light_sampling: bool,
+    /// See the row.
+    pub mis: bool,
 }
 
 /// A path on its way.
@@ -106,7 +117,7 @@ impl Integrator for PathTracer {
             depth += 1;
             std::mem::swap(&mut paths.states, &mut paths.next);
             std::mem::swap(&mut rays, &mut work.next);
-            let block = Block { scene, ids: &batch.ids, depth };
+            let block = Block { scene, ids: &batch.ids, depth, mis: self.mis };
             if depth > self.max_depth && !scene.features.emitting_surfaces {
                 block.leave_or_end(&rays, work, &mut paths, out);
                 paths.next.clear();
@@ -128,6 +139,8 @@ pub(super) struct Block<'a> {
     pub scene: &'a Scene,
     pub ids: &'a PathIds,
     pub depth: u32,
+    /// See [`PathTracer::mis`].
+    pub mis: bool,
 }
 
 impl PathTracer {
@@ -136,6 +149,7 @@ impl PathTracer {
             max_depth: p.number_or("max_depth", 6.0)? as u32,
             roulette_depth: p.number_or("roulette_depth", 4.0)? as u32,
             light_sampling: p.bool_or("light_sampling", true)?,
+            mis: p.bool_or("mis", true)?,
         })
     }
 
@@ -151,7 +165,7 @@ impl PathTracer {
         let rays = &batch.rays;
         work.counts.camera += rays.len() as u64;
         scene.kernel.intersect_batch(rays, &mut work.hits, Coherence::Coherent);
-        let block = Block { scene, ids: &batch.ids, depth: 1 };
+        let block = Block { scene, ids: &batch.ids, depth: 1, mis: self.mis };
         paths.begin(&mut work.next, &mut work.shadow);
         if work.hits.none() {
             // Most batches of most pictures: nothing but sky, and nothing to sort out.
@@ -296,6 +310,16 @@ impl Block<'_> {
         self.add_escapes(paths, out);
     }
 
+    /// What a scattered ray counts that ends on a light, which light samples find with density `light`.
+    #[inline]
+    fn weight(&self, state: &PathState, light: f32) -> f32 {
+        match self.mis {
+            true => power(state.pdf, light),
+            false if light > 0.0 => 0.0,
+            false => 1.0,
+        }
+    }
+
     /// The light that a path's end lies on, if it does.
     #[inline]
     fn add_emission(&self, state: &PathState, v: &Vertex, wi: Vec3, out: &mut PathResults) {
@@ -316,7 +340,7 @@ impl Block<'_> {
                 let state = &states[e.number as usize];
                 let end = PathEnd { wi: e.wi, vertex: None };
                 let pdf = || lights.pdf(light, &end, &state.from);
-                let weight = if state.pdf.is_finite() { power(state.pdf, pdf()) } else { 1.0 };
+                let weight = if state.pdf.is_finite() { self.weight(state, pdf()) } else { 1.0 };
                 out.li[state.index as usize] += state.beta * e.le * weight;
             }
         }
@@ -326,7 +350,7 @@ impl Block<'_> {
     fn add_end(&self, state: &PathState, light: u32, end: &PathEnd, out: &mut PathResults) {
         let from = state.pdf.is_finite().then_some(&state.from);
         let e = self.scene.lights.emitted(light, end, from);
-        let weight = if from.is_some() { power(state.pdf, e.pdf) } else { 1.0 };
+        let weight = if from.is_some() { self.weight(state, e.pdf) } else { 1.0 };
         out.li[state.index as usize] += state.beta * e.le * weight;
     }
 }

@@ -146,7 +146,7 @@ impl Block<'_> {
             return;
         }
         let pdf = chosen.pmf * l.pdf;
-        let weight = if l.delta { 1.0 } else { power(pdf, e.pdf) };
+        let weight = if l.delta || !self.mis { 1.0 } else { power(pdf, e.pdf) };
         let id = paths.points.get(s.number).id;
         work.shadow.push(&s.v.spawn_to(l.wi, l.dist, key(&id, self.depth) ^ SHADOW_KEY));
         let ask = l.li.is_none().then_some(chosen.light);

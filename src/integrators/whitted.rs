@@ -13,6 +13,7 @@ use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::base::vertex::Vertex;
 use crate::color::Rgb;
 use crate::sampler::{Dim, Slot, ray_key};
+use crate::sampling::mis::power;
 use crate::scene::Scene;
 use glam::Vec3;
 use std::sync::Arc;
@@ -67,11 +68,32 @@ struct Pending {
     ask: Option<u32>,
 }
 
+/// A ray that the material drew, which may find a light with an extent: the other half of what light samples bring.
+struct Scattered {
+    /// What the radiance found is multiplied by.
+    value: Rgb,
+    /// Density of its direction.
+    pdf: f32,
+    from: Receiver,
+    index: u32,
+}
+
 /// What a depth leaves for later.
 #[derive(Default)]
 struct Later {
     next: Vec<Chain>,
     pending: Vec<Pending>,
+    scattered: Vec<Scattered>,
+    scattered_rays: RayBatch,
+}
+
+impl Later {
+    fn clear(&mut self) {
+        self.next.clear();
+        self.pending.clear();
+        self.scattered.clear();
+        self.scattered_rays.clear();
+    }
 }
 
 /// A surface being shaded.
@@ -101,8 +123,7 @@ impl Integrator for Whitted {
                 _ => (&rays, 0.0, Coherence::Incoherent),
             };
             scene.kernel.intersect_batch(traced, &mut work.hits, coherence);
-            later.next.clear();
-            later.pending.clear();
+            later.clear();
             work.next.clear();
             work.shadow.clear();
             escapes.clear();
@@ -120,7 +141,7 @@ impl Integrator for Whitted {
                 }
                 let spot = Spot::new(scene, v, *chain, batch.ids.get(chain.index as usize), depth);
                 out.li[chain.index as usize] += chain.beta * spot.own_light(scene);
-                self.ask_lights(scene, &spot, &mut work.shadow, &mut later.pending);
+                self.ask_lights(scene, &spot, &mut work.shadow, &mut later);
                 if depth < self.max_depth {
                     spot.reflect(&mut work.next, &mut later.next);
                 }
@@ -132,6 +153,7 @@ impl Integrator for Whitted {
                 add_escapes(scene, &chains, &mut escapes, out);
             }
             self.resolve_shadows(scene, work, &mut escapes, &later.pending, out);
+            self.resolve_scattered(scene, work, &mut escapes, &later, out);
             std::mem::swap(&mut chains, &mut later.next);
             std::mem::swap(&mut rays, &mut work.next);
             work.counts.scattered += chains.len() as u64;
@@ -180,9 +202,12 @@ impl<'a> Spot<'a> {
         }
     }
 
-    /// The point as lights see it: lit from anywhere, as the material decides what shows.
+    /// The point as lights see it.
     fn receiver(&self) -> Receiver {
-        Receiver { ng: Vec3::ZERO, ns: Vec3::ZERO, ..self.v.receiver() }
+        match self.material.transmission() {
+            None => self.v.receiver(),
+            Some(_) => self.v.receiver_all_round(),
+        }
     }
 
     fn key(&self, light: u32) -> u32 {
@@ -201,9 +226,24 @@ impl<'a> Spot<'a> {
         if !self.v.is_consistent(l.wi) {
             return None;
         }
-        let value = self.chain.beta * self.material.eval(&self.prepared, self.wo, wi).f_cos;
-        let value = value * (l.li.unwrap_or(Rgb::WHITE) / l.pdf);
+        let e = self.material.eval(&self.prepared, self.wo, wi);
+        let weight = if l.delta { 1.0 } else { power(l.pdf, e.pdf) };
+        let value = self.chain.beta * e.f_cos * (l.li.unwrap_or(Rgb::WHITE) * (weight / l.pdf));
         (!value.is_black()).then(|| (self.v.spawn_to(l.wi, l.dist, self.key(light)), value))
+    }
+
+    /// A direction of the material's choice, in which a light may lie.
+    fn scatter(&self, later: &mut Later) {
+        let point = self.id.sampler.get_2d(self.id.index, Dim::at(self.depth, Slot::BsdfUv));
+        let lobe = self.id.sampler.get_2d(self.id.index, Dim::at(self.depth, Slot::LobeAndRoulette));
+        let Some(s) = self.material.sample(&self.prepared, self.wo, point, lobe[0]) else { return };
+        let wi = self.v.frame.to_world(s.wi);
+        let value = self.chain.beta * s.weight;
+        if !value.is_black() && self.v.is_consistent(wi) {
+            later.scattered_rays.push(&self.v.spawn(wi, self.key(u32::MAX)));
+            let (from, index) = (self.receiver(), self.chain.index);
+            later.scattered.push(Scattered { value, pdf: s.pdf, from, index });
+        }
     }
 
     /// The mirror direction, or what a perfectly smooth material makes of it.
@@ -231,8 +271,8 @@ impl<'a> Spot<'a> {
 const LIGHT_STRIDE: u32 = 1 << 14;
 
 impl Whitted {
-    /// One shadow ray to every light.
-    fn ask_lights(&self, scene: &Scene, spot: &Spot, shadow: &mut RayBatch, pending: &mut Vec<Pending>) {
+    /// One shadow ray to every light; and one ray drawn by the material, if lights have an extent.
+    fn ask_lights(&self, scene: &Scene, spot: &Spot, shadow: &mut RayBatch, later: &mut Later) {
         if spot.material.is_delta() || spot.material.is_black() {
             return;
         }
@@ -244,7 +284,11 @@ impl Whitted {
                 value = value * self.sky_light;
             }
             shadow.push(&ray);
-            pending.push(Pending { value, index: spot.chain.index, ask: l.li.is_none().then_some(number) });
+            let ask = l.li.is_none().then_some(number);
+            later.pending.push(Pending { value, index: spot.chain.index, ask });
+        }
+        if scene.features.emitting_surfaces || !scene.lights.at_infinity.is_empty() {
+            spot.scatter(later);
         }
     }
 
@@ -270,6 +314,41 @@ impl Whitted {
             for e in escapes.ask(&*scene.lights.list[light as usize]) {
                 let p = &pending[e.number as usize];
                 out.li[p.index as usize] += p.value * e.le;
+            }
+        }
+    }
+
+    /// What the materials' own rays found.
+    fn resolve_scattered(
+        &self,
+        scene: &Scene,
+        work: &mut Workspace,
+        escapes: &mut Escapes,
+        later: &Later,
+        out: &mut PathResults,
+    ) {
+        let rays = &later.scattered_rays;
+        work.counts.scattered += rays.len() as u64;
+        scene.kernel.intersect_batch(rays, &mut work.hits, Coherence::Incoherent);
+        escapes.clear();
+        for (i, s) in (0..).zip(&later.scattered) {
+            let Some(v) = vertex(scene, rays, &work.hits, i as usize, 0.0) else {
+                escapes.push(i, rays.direction(i as usize));
+                continue;
+            };
+            if let Some(light) = scene.lights.of_vertex(&v) {
+                let end = PathEnd { wi: rays.direction(i as usize), vertex: Some(&v) };
+                let light = &scene.lights.list[light as usize];
+                let weight = power(s.pdf, light.pdf_li(&s.from, &end));
+                out.li[s.index as usize] += s.value * light.le(&end) * weight;
+            }
+        }
+        for &light in &scene.lights.at_infinity {
+            let light = &*scene.lights.list[light as usize];
+            for e in escapes.ask(light) {
+                let s = &later.scattered[e.number as usize];
+                let weight = power(s.pdf, light.pdf_li(&s.from, &PathEnd { wi: e.wi, vertex: None }));
+                out.li[s.index as usize] += s.value * e.le * (weight * self.sky_light);
             }
         }
     }

@@ -1,6 +1,6 @@
 //! What materials of a diffuse base and one glossy lobe share: parameters, the choice between the two, and sampling.
 
-use crate::base::material::{BsdfEval, BsdfSample, Emitter, Material, Prepared};
+use crate::base::material::{BsdfEval, BsdfSample, Emitter, Material, Prepared, Transmission};
 use crate::base::registry::{ParamKind, ParamSpec, Params};
 use crate::base::shape::Needs;
 use crate::base::vertex::Vertex;
@@ -252,6 +252,10 @@ impl<L: Lobe> Material for Glossy<L> {
 
     fn is_physical(&self) -> bool {
         self.style.physical
+    }
+
+    fn transmission(&self) -> Option<Transmission> {
+        (!self.style.two_sided).then_some(Transmission { eta: 1.0 })
     }
 
     fn ambient(&self, _m: &Prepared) -> Rgb {

@@ -29,8 +29,8 @@ pub(super) const ROW: Row<dyn Material> = Row {
             with(1000.0, "brdf").with("diffuse", Value::Number(0.2)),
             with(30.0, "brdf").with("diffuse", Value::Number(0.0)),
             with(2.0, "cosine"),
-            with(5.0, "hemisphere").with("specular", Value::Numbers(vec![0.5, 0.1, 0.0])),
-            with(0.0, "brdf"),
+            with(2.0, "hemisphere").with("specular", Value::Numbers(vec![0.3, 0.1, 0.0])),
+            with(4.0, "brdf"),
         ]
     },
 };

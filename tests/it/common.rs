@@ -38,7 +38,7 @@ pub fn integrator(kind: &str, params: &[(&str, f64)]) -> std::sync::Arc<dyn inte
     let mut p = Params::new();
     for (name, value) in params {
         let value = match *name {
-            "light_sampling" => Value::Bool(*value != 0.0),
+            "light_sampling" | "mis" => Value::Bool(*value != 0.0),
             _ => Value::Number(*value),
         };
         p = p.with(name, value);

@@ -1,6 +1,7 @@
 //! The one integration-test binary: a module a subject.
 
 mod bad_geometry;
+mod classic;
 mod cli;
 mod common;
 mod crosscheck;

@@ -5,6 +5,8 @@ pub(super) mod looks;
 pub(super) mod soup;
 pub(super) mod stack;
 pub(super) mod statements;
+#[cfg(test)]
+mod tests;
 
 use crate::base::registry::{Node, Param, Params, Value};
 use crate::error::{Error, Place, Result};
