@@ -79,6 +79,8 @@ pub(super) struct PathState {
     pub pdf: f32,
     /// Where the ray left, for the density of light samples.
     pub from: Receiver,
+    /// Squared refractive index of the medium it travels in over that of the camera's.
+    pub eta2: f32,
     /// Index into the block.
     pub index: u32,
 }
@@ -181,7 +183,8 @@ impl PathTracer {
                 let Some(hit) = work.hits.get(i) else { continue };
                 let v = scene.vertex(&rays.get(i), hit, batch.spread);
                 let from = Receiver { p: v.p, ng: Vec3::ZERO, ns: Vec3::ZERO };
-                let state = PathState { beta: Rgb::WHITE, pdf: f32::INFINITY, from, index: i as u32 };
+                let state =
+                    PathState { beta: Rgb::WHITE, pdf: f32::INFINITY, from, eta2: 1.0, index: i as u32 };
                 surfaces.push(Surface::new(scene, v, state, k));
             }
             for s in &surfaces {

@@ -8,7 +8,7 @@ use super::Workspace;
 use super::path::{Block, PathScratch, PathState, PathTracer, Pending};
 use super::points::VertexPoint;
 use crate::base::light::{ChosenLight, LightSample, Receiver};
-use crate::base::material::{Material, Prepared};
+use crate::base::material::{Material, Prepared, Transmission};
 use crate::base::vertex::Vertex;
 use crate::color::Rgb;
 use crate::sampler::{Dim, SHADOW_KEY, Slot, ray_key};
@@ -25,6 +25,7 @@ pub(super) struct Surface<'a> {
     /// Its number among the hits of the depth.
     number: usize,
     material: &'a dyn Material,
+    transmission: Option<Transmission>,
     prepared: Prepared,
     /// Local direction to the viewer.
     wo: Vec3,
@@ -41,11 +42,19 @@ impl<'a> Surface<'a> {
     pub fn new(scene: &'a Scene, v: Vertex, state: PathState, number: usize) -> Self {
         let material = scene.material(&v);
         let wo = v.frame.to_local(v.wo);
-        let receiver = match material.transmission() {
-            None => v.receiver(),
-            Some(_) => v.receiver_all_round(),
-        };
-        Surface { v, state, number, material, prepared: Prepared::default(), wo, receiver, lit: None }
+        let transmission = material.transmission();
+        let receiver = if transmission.is_some() { v.receiver_all_round() } else { v.receiver() };
+        Surface {
+            v,
+            state,
+            number,
+            material,
+            transmission,
+            prepared: Prepared::default(),
+            wo,
+            receiver,
+            lit: None,
+        }
     }
 }
 
@@ -92,9 +101,11 @@ impl PathTracer {
         if beta.is_black() || !s.v.is_consistent(wi) {
             return;
         }
+        let eta2 = s.state.eta2 * s.transmission.map_or(1.0, |t| t.eta2(s.wo, b.wi));
         if roulette {
-            // Survival by throughput; never certain, so that no path of a white scene lives for ever.
-            let q = beta.max_component().min(0.95);
+            // Survival by throughput, in terms of the medium that the path began in: what radiance lost on entering
+            // glass it gains again on leaving. Never certain, so that no path of a white scene lives for ever.
+            let q = (beta * eta2).max_component().min(0.95);
             if lobe[1] >= q {
                 return;
             }
@@ -107,6 +118,7 @@ impl PathTracer {
             beta,
             pdf: if competes { b.pdf } else { f32::INFINITY },
             from: s.receiver,
+            eta2,
             index: s.state.index,
         });
     }
