@@ -6,6 +6,7 @@ mod cli;
 mod common;
 mod crosscheck;
 mod geometry;
+mod glass;
 mod kernels;
 mod layers;
 mod light;
