@@ -114,7 +114,7 @@ impl TangentCone {
 /// Computations", 4th ed., 8.5).
 pub fn eigen(a: DMat3) -> ([f64; 3], DMat3) {
     let mut m = a.to_cols_array_2d();
-    let mut v = DMat3::IDENTITY.to_cols_array_2d();
+    let mut v = DVec3::AXES;
     // Converges quadratically: a handful of sweeps suffices for any input.
     for _ in 0..10 {
         let mut rotated = false;
@@ -137,15 +137,13 @@ pub fn eigen(a: DMat3) -> ([f64; 3], DMat3) {
             m[q][p] = 0.0;
             (m[r][p], m[r][q]) = (c * rp - s * rq, s * rp + c * rq);
             (m[p][r], m[q][r]) = (m[r][p], m[r][q]);
-            for k in 0..3 {
-                (v[p][k], v[q][k]) = (c * v[p][k] - s * v[q][k], s * v[p][k] + c * v[q][k]);
-            }
+            (v[p], v[q]) = (v[p] * c - v[q] * s, v[p] * s + v[q] * c);
         }
         if !rotated {
             break;
         }
     }
-    ([m[0][0], m[1][1], m[2][2]], DMat3::from_cols_array_2d(&v))
+    ([m[0][0], m[1][1], m[2][2]], DMat3::from_cols(v[0], v[1], v[2]))
 }
 
 #[cfg(test)]
