@@ -370,6 +370,32 @@ mod tests {
         assert!(fresnel(critical * 1.001, 1.0 / 1.5).0.refracted > 0.0);
     }
 
+    /// What single bounces lose under light from everywhere: known, and none where facets are nearly flat. Prints.
+    #[test]
+    fn rough_glass_loses_no_more_than_facets_hide() {
+        // From inside more is lost: beyond the critical angle a tilted facet still refracts, along the surface, where
+        // others stand.
+        let roughness = [0.1, 0.3, 0.5, 0.7, 1.0];
+        for (eta, most) in
+            [(1.5f32, [2e-3, 0.015, 0.04, 0.1, 0.25]), (1.0 / 1.5, [5e-3, 0.04, 0.17, 0.32, 0.5])]
+        {
+            for (roughness, most) in roughness.into_iter().zip(most) {
+                let rough = Rough::new(Ggx::new(roughness, 0.0), eta);
+                let at = |i: usize| {
+                    let mu = (i as f32 + 0.5) / 64.0;
+                    let s = rough
+                        .shares(&View::new(Vec3::new((1.0 - mu * mu).sqrt(), 0.0, mu), eta).expect("above"));
+                    // The lattice's error.
+                    assert!(s.reflected + s.refracted < 1.005, "{eta} {roughness} {mu}: {s:?}");
+                    (1.0 - s.reflected - s.refracted) * 2.0 * mu / 64.0
+                };
+                let lost: f32 = (0..64).map(at).sum();
+                println!("eta {eta:.2}, roughness {roughness}: loses {:.2} %", 100.0 * lost);
+                assert!(lost < most && lost > -2e-3, "{eta} {roughness}: {lost}");
+            }
+        }
+    }
+
     #[test]
     fn light_bends_as_snell_says() {
         let n = Vec3::Z;
