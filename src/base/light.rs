@@ -5,6 +5,7 @@ use crate::base::space::RenderSpace;
 use crate::base::vertex::Vertex;
 use crate::color::Rgb;
 use crate::error::Result;
+use crate::math::aabb::Aabb;
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -54,6 +55,23 @@ pub struct Extent {
     pub radius: f32,
 }
 
+/// What bounds a source of light: where it is, and where it shines.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EmitterBounds {
+    /// Encloses it.
+    pub bounds: Aabb,
+    /// Unit vector in the middle of its surfaces' normals.
+    pub axis: Vec3,
+    /// Cosine of how far those normals spread about the axis; -1 where they look anywhere.
+    pub cos_spread: f32,
+    /// Cosine of how far from a normal light leaves: 0 for surfaces.
+    pub cos_reach: f32,
+    /// Whether it shines against its normals as well.
+    pub two_sided: bool,
+    /// Its power, as [`Light::power`] has it.
+    pub power: f32,
+}
+
 /// A source of light, in render space.
 pub trait Light: Send + Sync {
     /// Samples a direction to the light; None if nothing can arrive.
@@ -87,6 +105,12 @@ pub trait Light: Send + Sync {
     /// Power in watts (or, for lights without end, through a disc as large as the extent): steers the choice
     /// between lights.
     fn power(&self, extent: &Extent) -> f32;
+
+    /// What bounds it, for a choice between many lights by place; None for those at infinity, which are chosen by power
+    /// alone. Nothing may arrive from outside of the bounds, or where they say that it does not shine.
+    fn bounds(&self) -> Option<EmitterBounds> {
+        None
+    }
 
     /// Irradiance on an unoccluded surface at `p` with unit normal `n`, where a closed form is known.
     fn irradiance_closed_form(&self, _p: Vec3, _n: Vec3) -> Option<Rgb> {

@@ -4,7 +4,7 @@ use crate::base::registry::{ParamKind, ParamSpec, Row};
 use crate::base::skybox::Skybox;
 use crate::error::unknown_name;
 use crate::integrators;
-use crate::lights::sky::SkySampling;
+use crate::lights::{self, sky::SkySampling};
 use crate::sampler::Sampler;
 use crate::sampling::filter::PixelFilter;
 use crate::scene::registry::Registry;
@@ -61,7 +61,7 @@ impl Family {
     }
 }
 
-/// All families that scene files draw on. Kinds of the last three take no parameters.
+/// All families that scene files draw on. Kinds of the last four take no parameters.
 #[derive(Debug, Clone)]
 pub struct Families {
     /// Shapes.
@@ -82,6 +82,8 @@ pub struct Families {
     pub samplers: Family,
     /// Pixel filters.
     pub filters: Family,
+    /// Ways of choosing between lights; the first is the default.
+    pub light_samplers: Family,
     /// Ways of sampling a sky.
     pub sky_sampling: Family,
 }
@@ -104,6 +106,7 @@ impl Families {
             integrators: Family::of("integrator", integrators::REGISTRY),
             samplers: Family::of_names("sampler", Sampler::NAMES.map(|(name, s)| (name, s.doc()))),
             filters: Family::of_names("filter", PixelFilter::NAMES.map(|(name, f)| (name, f.doc()))),
+            light_samplers: Family::of_names("light sampler", lights::sampler::NAMES.iter().copied()),
             sky_sampling: Family::of_names(
                 "sky sampling",
                 SkySampling::NAMES.map(|(name, s)| (name, s.doc())),
@@ -124,6 +127,7 @@ impl Families {
             self.integrators,
             self.samplers,
             self.filters,
+            self.light_samplers,
         ];
         all.retain(|f| !f.kinds.is_empty());
         all

@@ -1,49 +1,90 @@
 //! Light from the surface of an object whose material emits.
 
-use crate::base::light::{Extent, Light, LightSample, PathEnd, Receiver};
-use crate::base::material::Material;
+use crate::base::light::{EmitterBounds, Extent, Light, LightSample, PathEnd, Receiver};
+use crate::base::material::{Emitter, Material};
 use crate::base::shape::Shape;
 use crate::color::Rgb;
+use crate::lights::tree::{LightTree, union};
 use crate::math::polygon::triangle_irradiance;
 use crate::sampling::distribution::Distribution1D;
 use glam::Vec3;
-use std::f32::consts::PI;
 use std::sync::Arc;
 
-/// An emitting shape in render space. A primitive is chosen by its area times its material's mean radiance, then a
-/// point of it by solid angle where the shape knows how.
+/// An emitting shape in render space. A primitive is chosen by what it may bring to the receiver, or, where there are
+/// very many, by its area times its material's mean radiance; then a point of it by solid angle where the shape knows how.
 pub struct AreaLight {
     shape: Arc<dyn Shape>,
     /// By slot; the last one stands in for slots beyond.
     materials: Vec<Arc<dyn Material>>,
-    primitives: Distribution1D,
+    primitives: Primitives,
+    bounds: EmitterBounds,
 }
+
+/// The choice of a primitive.
+enum Primitives {
+    /// By place and power.
+    Near(LightTree),
+    /// By power alone.
+    Power(Distribution1D),
+}
+
+/// More primitives than this are chosen by power alone: a tree takes 100 bytes for each.
+const MOST_IN_TREE: u32 = 1 << 16;
 
 impl AreaLight {
     /// From a shape in render space, whose primitives have the numbers that hits report, and the materials of its
     /// object by slot. None if nothing of it emits.
     pub fn new(shape: Arc<dyn Shape>, materials: Vec<Arc<dyn Material>>) -> Option<Self> {
         let last = materials.len().checked_sub(1)?;
-        // Luminous exitance of each slot.
-        let exitance: Vec<f64> = materials
-            .iter()
-            .map(|m| {
-                m.emitter()
-                    .map_or(0.0, |e| f64::from(e.mean.luminance()) * if e.two_sided { 2.0 } else { 1.0 })
-            })
-            .collect();
-        let weight = |p| match exitance[shape.material_slot(p).min(last)] {
-            0.0 => 0.0,
-            e => e * shape.primitive_area(p),
+        let emitters: Vec<Option<Emitter>> = materials.iter().map(|m| m.emitter()).collect();
+        let emitter = |p| emitters[shape.material_slot(p).min(last)];
+        let count = shape.primitive_count();
+        let primitives = match count {
+            2..=MOST_IN_TREE => {
+                let all: Vec<EmitterBounds> =
+                    (0..count).map(|p| primitive_bounds(&*shape, p, emitter(p))).collect();
+                Primitives::Near(LightTree::new(&all)?)
+            }
+            _ => {
+                let weights = (0..count).map(|p| power(&*shape, p, emitter(p)));
+                Primitives::Power(Distribution1D::new(weights)?)
+            }
         };
-        let primitives = Distribution1D::new((0..shape.primitive_count()).map(weight))?;
-        Some(AreaLight { shape, materials, primitives })
+        let shining = (0..count).filter(|&p| emitter(p).is_some());
+        let bounds =
+            shining.map(|p| primitive_bounds(&*shape, p, emitter(p))).reduce(|a, b| union(&a, &b))?;
+        // Sums of millions in f32 would lose the last ones.
+        let total: f64 = (0..count).map(|p| power(&*shape, p, emitter(p))).sum();
+        let bounds = EmitterBounds { power: total as f32, ..bounds };
+        Some(AreaLight { shape, materials, primitives, bounds })
     }
 
     #[inline]
     fn material(&self, prim: u32) -> &dyn Material {
         let slot = self.shape.material_slot(prim);
         &**self.materials.get(slot).unwrap_or(&self.materials[self.materials.len() - 1])
+    }
+}
+
+/// Luminous power of a primitive: pi times radiance and area, on each side that shines.
+fn power(shape: &dyn Shape, prim: u32, emitter: Option<Emitter>) -> f64 {
+    let Some(e) = emitter else { return 0.0 };
+    let sides = if e.two_sided { 2.0 } else { 1.0 };
+    std::f64::consts::PI * f64::from(e.mean.luminance()) * sides * shape.primitive_area(prim)
+}
+
+fn primitive_bounds(shape: &dyn Shape, prim: u32, emitter: Option<Emitter>) -> EmitterBounds {
+    let flat = shape.triangles().and_then(|t| {
+        let [a, b, c] = t.corners(prim).map(|v| v.as_dvec3());
+        (b - a).cross(c - a).try_normalize()
+    });
+    EmitterBounds {
+        bounds: shape.primitive_bounds(prim),
+        axis: flat.map_or(Vec3::Z, |n| n.as_vec3()),
+        cos_spread: if flat.is_some() { 1.0 } else { -1.0 },
+        cos_reach: 0.0,
+        two_sided: emitter.is_some_and(|e| e.two_sided),
+        power: power(shape, prim, emitter) as f32,
     }
 }
 
@@ -61,13 +102,21 @@ fn refined(u: [f32; 2]) -> f64 {
 
 impl Light for AreaLight {
     fn sample_li(&self, at: &Receiver, u: [f32; 2]) -> Option<LightSample> {
-        let choice = self.primitives.sample(refined(u));
-        let prim = choice.index as u32;
+        let (prim, pmf, du) = match &self.primitives {
+            Primitives::Near(tree) => {
+                let c = tree.sample(at, refined(u))?;
+                (c.emitter, c.pmf, c.du)
+            }
+            Primitives::Power(table) => {
+                let c = table.sample(refined(u));
+                (c.index as u32, c.pmf, c.du)
+            }
+        };
         // Below 1 also after rounding to f32.
-        let u = [(choice.du as f32).min(1.0 - f32::EPSILON / 2.0), u[1]];
+        let u = [(du as f32).min(1.0 - f32::EPSILON / 2.0), u[1]];
         let s = self.shape.sample_primitive(prim, at.p, u)?;
         let li = self.material(prim).emission(s.uv, -s.wi.dot(s.ng));
-        let pdf = choice.pmf as f32 * s.pdf;
+        let pdf = pmf as f32 * s.pdf;
         if li.is_black() || pdf <= 0.0 || !pdf.is_finite() {
             return None;
         }
@@ -76,7 +125,10 @@ impl Light for AreaLight {
 
     fn pdf_li(&self, at: &Receiver, end: &PathEnd) -> f32 {
         let Some(v) = end.vertex else { return 0.0 };
-        let pmf = self.primitives.pmf(v.prim as usize);
+        let pmf = match &self.primitives {
+            Primitives::Near(tree) => tree.pmf(at, v.prim),
+            Primitives::Power(table) => table.pmf(v.prim as usize),
+        };
         if pmf == 0.0 {
             return 0.0;
         }
@@ -110,6 +162,10 @@ impl Light for AreaLight {
     }
 
     fn power(&self, _extent: &Extent) -> f32 {
-        PI * self.primitives.total() as f32
+        self.bounds.power
+    }
+
+    fn bounds(&self) -> Option<EmitterBounds> {
+        Some(self.bounds)
     }
 }

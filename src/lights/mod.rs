@@ -7,6 +7,7 @@ mod point;
 pub mod sampler;
 pub mod sky;
 mod spot;
+mod tree;
 
 use crate::base::light::LightSource;
 use crate::base::registry::Row;

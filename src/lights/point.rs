@@ -1,11 +1,12 @@
 //! A point that shines alike in all directions.
 
-use crate::base::light::{Extent, Light, LightSample, LightSource, PathEnd, Receiver};
+use crate::base::light::{EmitterBounds, Extent, Light, LightSample, LightSource, PathEnd, Receiver};
 use crate::base::ray::MAX_COORDINATE;
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::base::space::RenderSpace;
 use crate::color::Rgb;
 use crate::error::{Error, Result};
+use crate::math::aabb::Aabb;
 use glam::{DVec3, Vec3};
 use std::f32::consts::PI;
 use std::sync::Arc;
@@ -121,6 +122,18 @@ impl Light for PointLight {
         // Of the lamp with the inverse square that is as bright at the scene's radius: all there is for other laws.
         let r = f64::from(extent.radius);
         4.0 * PI * self.intensity.luminance() * (r * r / self.attenuation(r)) as f32
+    }
+
+    fn bounds(&self) -> Option<EmitterBounds> {
+        Some(EmitterBounds {
+            bounds: Aabb::new(self.position, self.position),
+            axis: Vec3::Z,
+            cos_spread: -1.0,
+            cos_reach: 0.0,
+            two_sided: false,
+            // As if by the inverse square: of another law this is true at the distance 1, about the size of a scene in render space.
+            power: 4.0 * PI * self.intensity.luminance() / self.attenuation(1.0) as f32,
+        })
     }
 
     fn irradiance_closed_form(&self, p: Vec3, n: Vec3) -> Option<Rgb> {

@@ -1,11 +1,12 @@
 //! A point that shines into a cone.
 
-use crate::base::light::{Extent, Light, LightSample, LightSource, PathEnd, Receiver};
+use crate::base::light::{EmitterBounds, Extent, Light, LightSample, LightSource, PathEnd, Receiver};
 use crate::base::ray::MAX_COORDINATE;
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::base::space::RenderSpace;
 use crate::color::Rgb;
 use crate::error::{Error, Result};
+use crate::math::aabb::Aabb;
 use glam::{DVec3, Vec3};
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -181,6 +182,18 @@ impl Light for SpotLight {
 
     fn power(&self, _extent: &Extent) -> f32 {
         self.cone.solid_angle() as f32 * self.intensity.luminance()
+    }
+
+    fn bounds(&self) -> Option<EmitterBounds> {
+        Some(EmitterBounds {
+            bounds: Aabb::new(self.position, self.position),
+            axis: self.cone.axis.as_vec3(),
+            cos_spread: (1.0 - self.cone.m) as f32,
+            cos_reach: 1.0,
+            two_sided: false,
+            // Inside of its cone it is as bright as a lamp of this power that shines everywhere.
+            power: 2.0 * TAU as f32 * self.intensity.luminance(),
+        })
     }
 
     fn irradiance_closed_form(&self, p: Vec3, n: Vec3) -> Option<Rgb> {

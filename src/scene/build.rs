@@ -16,7 +16,6 @@ use crate::base::registry::{Node, Params, Value, build as build_node};
 use crate::base::space::RenderSpace;
 use crate::error::{Error, Result, unknown_name};
 use crate::lights::area::AreaLight;
-use crate::lights::sampler::FixedLightSampler;
 use crate::math::aabb::DAabb;
 use crate::{cameras, lights, skyboxes};
 use glam::DAffine3;
@@ -273,7 +272,8 @@ fn gather_lights(desc: &SceneDesc, placed: &Placed, registry: &Registry) -> Resu
     let at_infinity = (0..list.len() as u32).filter(|&i| list[i as usize].at_infinity()).collect();
     let bounds = placed.geometry.root().bounds;
     let extent = Extent { center: bounds.center(), radius: bounds.radius().max(1e-3) };
-    let sampler = Box::new(FixedLightSampler::power(&list, &extent));
+    let name = desc.render.light_sampler.as_deref().unwrap_or(lights::sampler::NAMES[0].0);
+    let sampler = lights::sampler::by_name(name, &list, &extent)?;
     Ok(Lights { list, sampler, at_infinity, by_path })
 }
 

@@ -68,6 +68,8 @@ pub struct RenderDesc {
     pub sampler: Option<String>,
     /// Name of the pixel filter.
     pub filter: Option<String>,
+    /// Name of the light sampler.
+    pub light_sampler: Option<String>,
     /// Seed of every random choice.
     pub seed: Option<u64>,
 }

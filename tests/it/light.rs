@@ -239,6 +239,67 @@ material = "lamp"
     }
 }
 
+/// A glowing mesh placed by three instances, squeezed, turned and mirrored, and the same three written out: light
+/// samples find the same light, by each way of choosing between lamps.
+#[test]
+fn glowing_instances_shine_as_their_flattened_twins() {
+    let head = |sampler: &str| {
+        format!(
+            r#"
+[film]
+size = [24, 24]
+[camera]
+type = "perspective"
+eye = [0, 3, 0]
+look_at = [0, 0, 0]
+up = [0, 0, 1]
+fov_deg = 40
+[render]
+light_sampler = "{sampler}"
+[materials.floor]
+type = "diffuse"
+albedo = 0.6
+[materials.lamp]
+type = "emissive"
+radiance = [5, 4, 2]
+[[objects]]
+shape = {{ type = "rectangle", edge_u = [0, 0, 4], edge_v = [4, 0, 0] }}
+material = "floor"
+"#
+        )
+    };
+    let ball = r#"shape = { type = "displaced_sphere", triangles = 1000, seed = 3 }, material = "lamp""#;
+    let places = [
+        "{ scale = [0.2, 0.1, 0.3] }, { rotate_deg = 30, axis = [0, 0, 1] }, { translate = [0.6, 0.5, 0.2] }",
+        "{ scale = [-0.2, 0.2, 0.2] }, { translate = [-0.7, 0.8, -0.5] }",
+        "{ scale = 0.1 }, { rotate_deg = 70, axis = [1, 2, 0] }, { translate = [0, 0.2, 0.7] }",
+    ];
+    let instanced = |sampler| {
+        let objects = places.map(|t| format!("[[objects]]\ngroup = \"lamp\"\ntransform = [{t}]\n"));
+        format!("{}[groups.lamp]\nobjects = [{{ {ball} }}]\n{}", head(sampler), objects.concat())
+    };
+    let flat = places
+        .map(|t| format!("[[objects]]\n{}\ntransform = [{t}]\n", ball.replace(", material", "\nmaterial")));
+    let truth = scene(&format!("{}{}", head("power"), flat.concat()));
+    assert_eq!(truth.report.groups, 1, "the twin has no instance");
+    let truth = mean(&render(&truth, integrator("direct", &[]), 256));
+    for sampler in ["tree", "power", "uniform"] {
+        let s = scene(&instanced(sampler));
+        assert_eq!((s.report.groups, s.lights.list.len()), (2, 3), "{sampler}");
+        for light_sampling in [1.0, 0.0] {
+            let m = mean(&render(&s, integrator("direct", &[("light_sampling", light_sampling)]), 256));
+            let error = m.error.hypot(truth.error);
+            let z = (m.value - truth.value).abs() / error;
+            assert!(
+                z < SIGMAS && error < 0.02 * truth.value,
+                "{sampler}: {} {} {error}",
+                m.value,
+                truth.value
+            );
+        }
+    }
+}
+
 #[test]
 fn a_point_light_obeys_the_inverse_square() {
     let s = scene(

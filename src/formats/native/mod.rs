@@ -146,19 +146,22 @@ impl Reader<'_, '_> {
     }
 
     fn render(&mut self, v: &Tree) -> Result<()> {
-        const OTHERS: &[&str] = &["integrator", "spp", "sampler", "seed"];
+        const OTHERS: &[&str] = &["integrator", "spp", "sampler", "light_sampler", "seed"];
         let families = self.families;
         let table = self.source.table("render", v)?;
         let section = Section { source: self.source, table, name: "[render]" };
         let spp = section.read("spp", |s, k, v| s.integer(k, v, 1, i64::from(u32::MAX)))?;
         let seed = section.read("seed", |s, k, v| s.integer(k, v, 0, i64::MAX))?;
         let sampler = section.read("sampler", |s, k, v| s.name_of(&families.samplers, k, v))?;
+        let light_samplers = &families.light_samplers;
+        let light_sampler = section.read("light_sampler", |s, k, v| s.name_of(light_samplers, k, v))?;
         let integrator = self.integrator(table, v, OTHERS)?;
         let render = &mut self.scene.render;
         *render = RenderDesc {
             integrator,
             spp: spp.map(|n| n as u32),
             sampler,
+            light_sampler,
             seed: seed.map(|n| n as u64),
             filter: render.filter.take(),
         };

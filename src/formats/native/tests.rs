@@ -52,6 +52,7 @@ fn families() -> Families {
         integrators: family("integrator", INTEGRATORS),
         samplers: family("sampler", &[("sobol", &[]), ("random", &[])]),
         filters: family("filter", &[("box", &[]), ("tent", &[])]),
+        light_samplers: family("light sampler", &[("tree", &[]), ("power", &[])]),
         sky_sampling: family("sky sampling", &[("mis", &[]), ("cosine", &[])]),
     }
 }
