@@ -329,5 +329,4 @@ pub fn union(a: &EmitterBounds, b: &EmitterBounds) -> EmitterBounds {
 }
 
 #[cfg(test)]
-#[path = "tree/tests.rs"]
 mod tests;
