@@ -10,6 +10,7 @@ mod glass;
 mod kernels;
 mod layers;
 mod light;
+mod matches;
 mod open_house;
 mod reference;
 mod source;
