@@ -1,5 +1,6 @@
 //! L2: materials, one file a kind.
 
+mod beckmann;
 mod blinn_phong;
 mod conductor;
 mod dielectric;
@@ -22,6 +23,7 @@ pub static REGISTRY: &[Row<dyn Material>] = &[
     diffuse::ROW,
     mirror::ROW,
     metal::ROW,
+    beckmann::ROW,
     dielectric::ROW,
     emissive::ROW,
     blinn_phong::ROW,
