@@ -58,7 +58,7 @@ fn small(scene: &str, wish: Wish) -> (Pixels, Vec<[f32; 3]>, PixelRect) {
     (shot::pixels(&film), shot::variances(&film), film.window())
 }
 
-/// Tiles of 128 x 128 pixels of the reference. What a whole picture may be off by: 1 % of a tile, for edges that the
+/// Tiles of 64 or 128 pixels a side of the reference. What a whole picture may be off by: 1 % of a tile, for edges that the
 /// references' wider filters carry over into the next tile and for textures of 8-bit values; beside that, noise: six
 /// standard errors (3.3 are to be expected of 200 values).
 fn assert_tiles(name: &str, ours: &Pixels, variances: &[[f32; 3]], reference: &Pixels, absolute: f64) {
@@ -75,6 +75,15 @@ fn cornell_box_agrees_with_tungsten() {
     let wish = Wish { size: Some([128, 128]), spp: Some(32), ..Wish::default() };
     let (ours, variances, _) = small("cornell-box.toml", wish);
     assert_tiles("Cornell box", &ours, &variances, &reduced(&reference, 8), 1e-4);
+}
+
+#[test]
+fn plates_and_lamps_agree_with_tungsten() {
+    let Some(data) = data() else { return };
+    let reference = Pixels::read(&data.join("scenes/bitterli/veach-mis/pbrt/TungstenRender.exr")).unwrap();
+    let wish = Wish { size: Some([320, 180]), spp: Some(16), ..Wish::default() };
+    let (ours, variances, _) = small("veach-mis.toml", wish);
+    assert_tiles("plates", &ours, &variances, &reduced(&reference, 4), 1e-4);
 }
 
 /// By 8-bit values, decoded again; below the lamp, which is clipped there. What two paints make of a spectrum is not in
