@@ -3,6 +3,7 @@
 mod args;
 mod bench;
 mod check;
+mod convert;
 mod crosscheck;
 mod info;
 mod interrupt;
@@ -76,6 +77,8 @@ enum Verb {
     Crosscheck(Box<crosscheck::CrosscheckArgs>),
     /// Certify that rays neither leak, nor meet what they left, nor jump over what is near, on every kernel
     Check(Box<check::CheckArgs>),
+    /// Write a scene of another program as a native one
+    Convert(convert::ConvertArgs),
     /// List every registered kind with its parameters
     List(list::ListArgs),
     /// Print the completions of a shell
@@ -121,6 +124,7 @@ fn run() -> Result<(), Failure> {
         Verb::Bench(args) => bench::run(args, &setting)?,
         Verb::Crosscheck(args) => crosscheck::run(args, &setting)?,
         Verb::Check(args) => check::run(args, &setting)?,
+        Verb::Convert(args) => convert::run(args, &setting)?,
         Verb::List(args) => list::run(args)?,
         Verb::Completions(args) => manual::completions(args)?,
         Verb::Man(args) => manual::man(args)?,

@@ -88,7 +88,7 @@ enum Up {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum CompatArg {
+pub(super) enum CompatArg {
     Exact,
     Physical,
 }

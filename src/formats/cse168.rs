@@ -10,13 +10,13 @@ use super::commands::soup::Soup;
 use super::commands::stack::TransformStack;
 use super::commands::statements::{Skipped, Statement, for_each};
 use super::commands::{camera, film_size, node, numbers, object};
-use super::seed::{attenuation, radius};
+use super::seed::{attenuation, output, radius};
 use crate::base::registry::{Node, Value};
 use crate::color::Transfer;
 use crate::error::{Place, Result};
 use crate::formats::native::GAMMAS;
 use crate::formats::{Compat, LoadOptions, SceneFormat, SceneText};
-use crate::scene::desc::SceneDesc;
+use crate::scene::desc::{Loss, SceneDesc};
 use glam::{DAffine3, DVec3};
 use std::path::Path;
 use std::sync::Arc;
@@ -152,8 +152,7 @@ impl<'a> Reader<'a> {
         }
         match s.word {
             "size" => self.scene.film.size = film_size(s)?,
-            // The command line says where a picture goes.
-            "output" => drop(s.next()),
+            "output" => output(s, &mut self.scene),
             "maxdepth" => self.max_depth = s.integer(-1, 4095)?,
             "spp" => self.spp = s.integer(1, i64::from(u32::MAX))? as u32,
             "camera" => self.scene.camera = Some(camera(s, |fov| fov)?),
@@ -192,9 +191,15 @@ impl<'a> Reader<'a> {
                     _ => Integrator::RayTracer,
                 }
             }
-            "lightsamples" => self.light_samples = s.integer(1, 1 << 20)? as u32,
-            // Our points are stratified either way.
-            "lightstratify" => drop(s.choice(&["on", "off"])?),
+            "lightsamples" => {
+                self.light_samples = s.integer(1, 1 << 20)? as u32;
+                self.lose(s, "samples of lights are samples of the pixel, as many for every light");
+            }
+            "lightstratify" => {
+                if s.choice(&["on", "off"])? == "off" {
+                    self.lose(s, "our points are stratified all the same");
+                }
+            }
             "nexteventestimation" => {
                 self.next_event = match s.choice(&["on", "off", "mis"])? {
                     "on" => NextEvent::On,
@@ -223,6 +228,10 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
+    fn lose(&mut self, s: &Statement, what: &str) {
+        self.scene.losses.push(Loss { section: "render", place: s.place(), what: what.into() });
+    }
+
     /// Triangles of one look and transform become one mesh.
     fn prepare_triangle(&mut self, s: &Statement) {
         let top = self.stack.top();
@@ -242,6 +251,7 @@ impl<'a> Reader<'a> {
     }
 
     fn sphere(&mut self, s: &mut Statement) -> Result<()> {
+        self.flush();
         let place = s.place();
         let params = vec![("center", numbers(s.vector()?)), ("radius", Value::Number(radius(s)?))];
         self.objects.push((node("sphere", &place, params), self.look.clone(), self.stack.top()));
@@ -277,7 +287,7 @@ impl<'a> Reader<'a> {
             return Err(s.error("the edges of a `quadLight` are parallel: it has no area"));
         }
         self.quad_lights += 1;
-        let name = format!("light {}", self.quad_lights);
+        let name = format!("light-{}", self.quad_lights);
         let value = node("emissive", &place, vec![("radiance", numbers(color))]);
         self.scene.materials.push(crate::scene::desc::Named {
             name: name.clone(),
@@ -293,6 +303,7 @@ impl<'a> Reader<'a> {
         self.flush();
         let known = [&TransformStack::WORDS[..], &Look::WORDS, &Soup::WORDS, WORDS].concat();
         self.skipped.warn(&known);
+        self.scene.losses.extend(self.skipped.losses());
         for (shape, look, transform) in std::mem::take(&mut self.objects) {
             let (at, classic, sampling) = (&shape.place, self.integrator, self.sampling);
             let compat = self.compat;

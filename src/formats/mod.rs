@@ -28,8 +28,8 @@ struct MeshFormat {
 }
 
 const MESH_FORMATS: &[MeshFormat] = &[
-    MeshFormat { extension: "ply", recognise: |b| b.starts_with(b"ply"), parse: ply::parse },
     MeshFormat { extension: "obj", recognise: looks_like_obj, parse: obj::parse },
+    MeshFormat { extension: "ply", recognise: |b| b.starts_with(b"ply"), parse: ply::parse },
 ];
 
 /// Whether the first statement is one of OBJ's.
@@ -139,6 +139,9 @@ pub fn load_with(path: &Path, options: &LoadOptions) -> Result<SceneDesc> {
     }
     let extension = source::content_extension(path);
     let named = SCENE_FORMATS.iter().find(|f| Some(f.extension) == extension.as_deref());
+    if named.is_none() && !path.exists() {
+        return Err(unknown_kind(path));
+    }
     let bytes = source::read(path)?;
     match kind_of(path, &bytes, named)? {
         Kind::Mesh(_) => mesh_scene::load(path),
@@ -170,20 +173,20 @@ fn kind_of(path: &Path, bytes: &[u8], named: Option<&'static SceneFormat>) -> Re
         }
         // Its own reader says best what is wrong with it.
         (None, Some(named)) => Ok(Kind::Scene(named)),
-        (None, None) => {
-            let known = || SCENE_FORMATS.iter().map(|f| f.extension).chain(mesh_extensions());
-            let what = match source::content_extension(path) {
-                Some(extension) => unknown_name("kind of scene file", &extension, known()),
-                None => {
-                    let known = known().collect::<Vec<_>>().join(", ");
-                    format!(
-                        "has neither an extension nor a content that tells the kind of file; known: {known}"
-                    )
-                }
-            };
-            Err(Error::content(path, what))
-        }
+        (None, None) => Err(unknown_kind(path)),
     }
+}
+
+fn unknown_kind(path: &Path) -> Error {
+    let known = || SCENE_FORMATS.iter().map(|f| f.extension).chain(mesh_extensions());
+    let what = match source::content_extension(path) {
+        Some(extension) => unknown_name("kind of scene file", &extension, known()),
+        None => {
+            let known = known().collect::<Vec<_>>().join(", ");
+            format!("has no extension and no content that would tell the kind of file; known: {known}")
+        }
+    };
+    Error::content(path, what)
 }
 
 /// As many bytes as a format is recognised by.
@@ -204,13 +207,17 @@ pub fn is_mesh_path(path: &Path) -> bool {
 pub fn load_mesh(path: &Path) -> Result<MeshData> {
     let extension = source::content_extension(path);
     let named = MESH_FORMATS.iter().find(|format| Some(format.extension) == extension.as_deref());
+    let unknown = || {
+        let what =
+            unknown_name("kind of mesh file", &extension.clone().unwrap_or_default(), mesh_extensions());
+        Error::content(path, format!("{what} (each also packed as .gz or .zst)"))
+    };
+    if named.is_none() && !path.exists() {
+        return Err(unknown());
+    }
     let bytes = source::read(path)?;
     let by_content = || MESH_FORMATS.iter().find(|f| (f.recognise)(&bytes[..bytes.len().min(HEAD)]));
-    let Some(format) = named.or_else(by_content) else {
-        let name = extension.unwrap_or_default();
-        let what = unknown_name("kind of mesh file", &name, mesh_extensions());
-        return Err(Error::content(path, format!("{what} (each also packed as .gz or .zst)")));
-    };
+    let format = named.or_else(by_content).ok_or_else(unknown)?;
     let mesh = (format.parse)(path, &bytes)?;
     if let Some(repairs) = mesh.repairs.describe() {
         log::warn!("{}: {repairs}", path.display());

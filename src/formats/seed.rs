@@ -25,7 +25,7 @@ use crate::error::{Place, Result};
 use crate::formats::files::Files;
 use crate::formats::sky_files::load_sky;
 use crate::formats::{Compat, LoadOptions, SceneFormat, SceneText};
-use crate::scene::desc::{SceneDesc, SkyDesc};
+use crate::scene::desc::{Loss, SceneDesc, SkyDesc};
 use glam::{DAffine3, DVec3};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -95,6 +95,8 @@ struct Reader<'a> {
     sky: Option<PathBuf>,
     sky_light: f64,
     skipped: Skipped,
+    /// What has no place among radiometric units.
+    unphysical: Vec<Loss>,
 }
 
 impl<'a> Reader<'a> {
@@ -118,17 +120,21 @@ impl<'a> Reader<'a> {
             sky: None,
             sky_light: 1.0,
             skipped: Skipped::default(),
+            unphysical: Vec::new(),
         }
     }
 
     fn statement(&mut self, s: &mut Statement) -> Result<()> {
         if self.soup.apply(s)? || self.stack.apply(s)? || self.look.apply(s)? {
+            if s.word == "ambient" && self.look.ambient != [0.0; 3] {
+                let what = "ambient terms, which no light explains".into();
+                self.unphysical.push(Loss { section: "materials", place: s.place(), what });
+            }
             return Ok(());
         }
         match s.word {
             "size" => self.scene.film.size = film_size(s)?,
-            // The command line says where a picture goes.
-            "output" => drop(s.next()),
+            "output" => output(s, &mut self.scene),
             "maxdepth" => self.max_depth = s.integer(0, 4095)?,
             "spp" => self.scene.render.spp = Some(s.integer(1, i64::from(u32::MAX))? as u32),
             "camera" => self.scene.camera = Some(camera(s, f64::trunc)?),
@@ -240,6 +246,11 @@ impl<'a> Reader<'a> {
         };
         self.sky = Some(locate(self.path, named, s)?);
         self.sky_light = intensity;
+        if intensity != 1.0 {
+            let what =
+                format!("the sky's light is not scaled by {intensity}, which would leave the sky as it is");
+            self.unphysical.push(Loss { section: "sky", place: s.place(), what });
+        }
         Ok(())
     }
 
@@ -247,6 +258,10 @@ impl<'a> Reader<'a> {
         let known = [&TransformStack::WORDS[..], &Look::WORDS, &Soup::WORDS, WORDS].concat();
         self.skipped.warn(&known);
         let mut scene = self.scene;
+        scene.losses.extend(self.skipped.losses());
+        if self.compat == Compat::Physical {
+            scene.losses.extend(self.unphysical);
+        }
         if self.soup.has_triangles() {
             log::warn!("{}: the triangles after the last `mesh` belong to none", self.path.display());
         }
@@ -261,6 +276,13 @@ impl<'a> Reader<'a> {
         });
         (scene, self.sky)
     }
+}
+
+/// The command line says where a picture goes.
+pub(super) fn output(s: &mut Statement, scene: &mut SceneDesc) {
+    let named = s.remainder("a picture").unwrap_or_default();
+    let what = format!("the picture's name, {named}: it is given when rendering");
+    scene.losses.push(Loss { section: "film", place: s.place(), what });
 }
 
 fn mesh_node(place: &Place, mesh: Value) -> Node {

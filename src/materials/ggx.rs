@@ -42,7 +42,6 @@ pub(super) const ROW: Row<dyn Material> = Row {
             with(0.01, 0.0, 0.0),
             with(0.7, 0.1, 0.5),
             with(0.5, 0.5, 0.0),
-            with(0.2, 0.3, 0.3).with("sampling", Value::Text("cosine".into())),
         ]
     },
 };

@@ -1,5 +1,6 @@
 //! The modified Phong model: a diffuse base and a normalised lobe about the mirror direction (Lafortune and Willems,
-//! "Using the Modified Phong Reflectance Model for Physically Based Rendering", 1994, eq. 5 and 6).
+//! "Using the Modified Phong Reflectance Model for Physically Based Rendering", 1994, eq. 5 and 6). No more light leaves
+//! than arrives where the two colours sum to 1 at most, which published scenes do not keep to.
 
 use crate::base::material::Material;
 use crate::base::registry::{Params, Row, Value};
@@ -36,7 +37,7 @@ pub(super) const ROW: Row<dyn Material> = Row {
 };
 
 fn from_params(p: &Params) -> Result<Glossy<Phong>> {
-    let style = Style { diffuse_scale: FRAC_1_PI, two_sided: true, mirrors: false, physical: true };
+    let style = Style { diffuse_scale: FRAC_1_PI, two_sided: true, mirrors: false, physical: false };
     Glossy::from_params(p, Phong { shininess: p.number_or("shininess", 20.0)? as f32 }, style)
 }
 

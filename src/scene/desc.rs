@@ -29,6 +29,19 @@ pub struct SceneDesc {
     pub objects: Vec<ObjectDesc>,
     /// Lights beside the sky and emitting objects.
     pub lights: Vec<Node>,
+    /// What of the file did not come over.
+    pub losses: Vec<Loss>,
+}
+
+/// Something that a file says and a scene cannot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Loss {
+    /// The section of a native scene where it would stand: "film", "render", ...
+    pub section: &'static str,
+    /// Where it stands in its file.
+    pub place: Place,
+    /// What it is, and what becomes of it.
+    pub what: String,
 }
 
 /// Something with a name and a place in its file.

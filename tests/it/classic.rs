@@ -7,8 +7,8 @@ use skylit::color::Rgb;
 fn floor(material: &str, rest: &str) -> String {
     format!(
         "[film]\nsize = [9, 9]\n[camera]\ntype = \"perspective\"\neye = [0, 4, 0]\nup = [0, 0, 1]\nfov_deg = 0.01\n\
-         [materials.m]\n{material}\n[[objects]]\nshape = {{ type = \"rectangle\" }}\nmaterial = \"m\"\n\
-         transform = [{{ scale = 100 }}, {{ rotate_deg = -90, axis = [1, 0, 0] }}]\n{rest}"
+         [materials.m]\n{material}\n[[objects]]\nmaterial = \"m\"\n\
+         shape = {{ type = \"quad\", corner = [-100, 0, -100], edge_a = [0, 0, 200], edge_b = [200, 0, 0] }}\n{rest}"
     )
 }
 
@@ -56,8 +56,8 @@ fn what_stands_nearer_than_a_light_blocks_it_and_what_stands_beyond_does_not() {
 #[test]
 fn mirrors_are_followed_to_the_depth_and_show_the_sky_as_it_is() {
     // Two floors face each other with the camera between: each chain adds the ambient term times 0.4 a mirror.
-    let ceiling = "[[objects]]\nshape = { type = \"rectangle\" }\nmaterial = \"m\"\n\
-                   transform = [{ scale = 100 }, { rotate_deg = 90, axis = [1, 0, 0] }, { translate = [0, 9, 0] }]";
+    let ceiling = "[[objects]]\nmaterial = \"m\"\n\
+                   shape = { type = \"quad\", corner = [-100, 9, -100], edge_a = [200, 0, 0], edge_b = [0, 0, 200] }";
     let twice = scene(&floor(CLASSIC, ceiling));
     for depth in [1, 2, 3, 10] {
         let got = center(&twice, "whitted", &[("max_depth", f64::from(depth))], 1);

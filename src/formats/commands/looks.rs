@@ -93,7 +93,7 @@ impl Looks {
         let number = *self.numbers.entry(key).or_insert(next);
         if number == next {
             let value = make()?;
-            self.materials.push(Named { name: format!("look {}", next + 1), value, place: place.clone() });
+            self.materials.push(Named { name: format!("look-{}", next + 1), value, place: place.clone() });
         }
         Ok(self.materials[number].name.clone())
     }

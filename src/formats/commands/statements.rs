@@ -1,6 +1,7 @@
 //! A text as statements: a word and its arguments a line, comments from `#` on.
 
 use crate::error::{Error, Place, Result, nearest, unknown_name};
+use crate::scene::desc::Loss;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -162,6 +163,18 @@ impl Skipped {
         const MOST: usize = 64;
         let word = if self.words.len() < MOST { short(s.word) } else { "others".into() };
         self.words.entry(word).or_insert_with(|| (s.place(), 0)).1 += 1;
+    }
+
+    /// What was skipped, for whoever writes the scene anew.
+    pub fn losses(&self) -> impl Iterator<Item = Loss> {
+        self.words.iter().map(|(word, (place, count))| {
+            let lines = if *count > 1 { format!(", {count} lines") } else { String::new() };
+            Loss {
+                section: "film",
+                place: place.clone(),
+                what: format!("the unknown command \"{word}\"{lines}"),
+            }
+        })
     }
 
     /// Logs what was skipped.

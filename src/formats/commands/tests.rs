@@ -66,7 +66,6 @@ fn errors_say_where_what_and_what_else() {
         ("tri 0 0 0", "vertex 0 does not exist: 0 stand above"),
         ("shininess -1", "`shininess` takes a number from 0 to 1e6, not -1"),
         ("attenuation 0 0 0", "`attenuation` takes three numbers that are not all 0"),
-        ("maxdepth 1.5", "`maxdepth` takes a whole number"),
         ("spp 0", "`spp` takes a whole number"),
     ] {
         let message = refused(text);
@@ -86,6 +85,8 @@ fn format_specific_errors_are_located_too() {
             "a.scene:1:9: unknown word for `matType` \"Glass\"; known: Normal, Mirror",
         ),
         (&seed::FORMAT, "mesh Ground", "`mesh` without a `tri` since the last one"),
+        (&seed::FORMAT, "maxdepth 1.5", "`maxdepth` takes a whole number from 0 to 4095, not 1.5"),
+        (&cse168::FORMAT, "maxdepth -2", "`maxdepth` takes a whole number from -1 to 4095, not -2"),
         (&seed::FORMAT, "OBJ ", "`OBJ` wants the path of an OBJ file here"),
         (&cse168::FORMAT, "quadLight 0 0 0 1 0 0 2 0 0 1 1 1", "are parallel: it has no area"),
         (
@@ -244,5 +245,10 @@ fn content_tells_the_kind_of_file_where_its_name_does_not() {
     assert_eq!(kind(load("b.txt", native)).as_deref(), Some("ao"));
     assert_eq!(load("mesh.data", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap().objects.len(), 1);
     let e = load("c.txt", "once upon a time").map(drop).unwrap_err().to_string();
-    assert!(e.contains("unknown kind of scene file \"txt\"; known: toml, test, scene, ply, obj"), "{e}");
+    assert!(
+        e.contains(
+            "unknown kind of scene file \"txt\"; did you mean \"test\"? known: toml, test, scene, obj, ply"
+        ),
+        "{e}"
+    );
 }

@@ -8,6 +8,7 @@ mod tests;
 mod transform;
 mod tree;
 mod values;
+pub mod write;
 
 use crate::base::registry::Node;
 use crate::color::Transfer;

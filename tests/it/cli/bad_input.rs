@@ -59,9 +59,9 @@ fn missing_and_unwritable_files_are_told_first() {
     f.refuses("render none.ply -o a", 2, &["a"]);
     fs::create_dir(f.path().join("dir.png")).unwrap();
     f.refuses("render none.ply -o dir.png", 3, &["dir.png"]);
-    f.refuses("render scene.xyz -o a.png", 2, &["scene.xyz", "known: toml, obj, ply"]);
+    f.refuses("render scene.xyz -o a.png", 2, &["scene.xyz", "known: toml, test, scene, obj, ply"]);
     f.refuses("render . -o a.png", 2, &["folder"]);
-    f.refuses("render scene -o a.png", 2, &["scene", "no extension", "known: toml, obj, ply"]);
+    f.refuses("render scene -o a.png", 2, &["scene", "no extension", "known: toml, test, scene, obj, ply"]);
 }
 
 /// A limit on the size of files, and by the same way a full disk, is an error that leaves nothing behind.
