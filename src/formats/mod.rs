@@ -16,6 +16,7 @@ mod triangulate;
 use crate::base::mesh_data::MeshData;
 use crate::error::{Error, Result, unknown_name};
 use crate::formats::families::Families;
+use crate::formats::source::Source;
 use crate::scene::desc::SceneDesc;
 use std::path::Path;
 
@@ -24,12 +25,12 @@ struct MeshFormat {
     extension: &'static str,
     /// Whether the first bytes of a file look like it; asked where the extension says nothing.
     recognise: fn(&[u8]) -> bool,
-    parse: fn(&Path, &[u8]) -> Result<MeshData>,
+    read: fn(&Path, Source) -> Result<MeshData>,
 }
 
 const MESH_FORMATS: &[MeshFormat] = &[
-    MeshFormat { extension: "obj", recognise: looks_like_obj, parse: obj::parse },
-    MeshFormat { extension: "ply", recognise: |b| b.starts_with(b"ply"), parse: ply::parse },
+    MeshFormat { extension: "obj", recognise: looks_like_obj, read: obj::read },
+    MeshFormat { extension: "ply", recognise: |b| b.starts_with(b"ply"), read: ply::read },
 ];
 
 /// Whether the first statement is one of OBJ's.
@@ -215,10 +216,15 @@ pub fn load_mesh(path: &Path) -> Result<MeshData> {
     if named.is_none() && !path.exists() {
         return Err(unknown());
     }
-    let bytes = source::read(path)?;
-    let by_content = || MESH_FORMATS.iter().find(|f| (f.recognise)(&bytes[..bytes.len().min(HEAD)]));
-    let format = named.or_else(by_content).ok_or_else(unknown)?;
-    let mesh = (format.parse)(path, &bytes)?;
+    let format = match named {
+        Some(format) => format,
+        None => {
+            let mut head = Vec::new();
+            Source::open(path)?.fill(&mut head, HEAD)?;
+            MESH_FORMATS.iter().find(|f| (f.recognise)(&head)).ok_or_else(unknown)?
+        }
+    };
+    let mesh = (format.read)(path, Source::open(path)?)?;
     if let Some(repairs) = mesh.repairs.describe() {
         log::warn!("{}: {repairs}", path.display());
     }

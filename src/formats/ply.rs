@@ -11,6 +11,7 @@ mod binary;
 mod faces;
 mod general;
 mod header;
+mod stream;
 mod wedges;
 mod words;
 mod write;
@@ -19,9 +20,11 @@ pub use write::{write_ply, write_ply_to};
 
 use crate::base::mesh_data::{MeshData, Positions, Repairs};
 use crate::error::{Error, Result};
+use crate::formats::source::Source;
 use faces::Faces;
 use header::{Element, Format, Header, Kind};
 use std::path::Path;
+use stream::Stream;
 use wedges::Wedges;
 
 /// Coordinates this many times larger than the mesh are taken from text in double precision, even where the header
@@ -51,11 +54,15 @@ enum Role {
 struct Plan<'a> {
     path: &'a Path,
     format: Format,
-    /// All bytes of the file, and where the values start.
-    bytes: &'a [u8],
-    body: usize,
     elements: Vec<(Element, Role)>,
     vertices: u32,
+}
+
+/// A file of text: all its bytes, and where the values start.
+#[derive(Clone, Copy)]
+struct Text<'a> {
+    bytes: &'a [u8],
+    body: usize,
 }
 
 /// What stands in the tables of a file.
@@ -91,15 +98,42 @@ impl Tables {
 /// # Errors
 /// [`Error::Content`] for a damaged file (in text with the line), and where there is no surface.
 pub fn parse(path: &Path, bytes: &[u8]) -> Result<MeshData> {
-    let plan = plan(path, bytes, header::parse(path, bytes)?)?;
+    read(path, Source::of_bytes(path, bytes))
+}
+
+/// As [`parse`], from a file. A binary one is read piece by piece: memory holds the tables and not the file.
+///
+/// # Errors
+/// As [`parse`], and those of reading.
+pub fn read(path: &Path, mut source: Source) -> Result<MeshData> {
+    let mut bytes = Vec::new();
+    // What the header promises is held against the size, so where that is not known all must be read first.
+    let size = match source.size() {
+        Some(size) => {
+            source.fill(&mut bytes, header::MAX_HEADER)?;
+            size
+        }
+        None => {
+            source.read_rest(&mut bytes)?;
+            bytes.len() as u64
+        }
+    };
+    let header = header::parse(path, &bytes, size)?;
+    let body = header.body;
+    let plan = plan(path, header)?;
     let tables = match plan.format {
-        Format::Ascii => ascii::read(&plan)?,
-        Format::LittleEndian | Format::BigEndian => binary::read(&plan)?,
+        Format::Ascii => {
+            source.read_rest(&mut bytes)?;
+            ascii::read(&plan, Text { bytes: &bytes, body })?
+        }
+        Format::LittleEndian | Format::BigEndian => {
+            binary::read(&plan, Stream::new(path, source, bytes, body, size))?
+        }
     };
     assemble(&plan, tables)
 }
 
-fn plan<'a>(path: &'a Path, bytes: &'a [u8], header: Header) -> Result<Plan<'a>> {
+fn plan(path: &Path, header: Header) -> Result<Plan<'_>> {
     let fail = |message: String| Error::content(path, message);
     let mut vertices = None;
     let mut elements = Vec::new();
@@ -131,7 +165,7 @@ fn plan<'a>(path: &'a Path, bytes: &'a [u8], header: Header) -> Result<Plan<'a>>
             n => format!("it holds {n} points and no faces; a surface is needed (face or tristrips)"),
         }));
     }
-    Ok(Plan { path, format: header.format, bytes, body: header.body, elements, vertices })
+    Ok(Plan { path, format: header.format, elements, vertices })
 }
 
 fn columns(element: &Element) -> Result<Columns, String> {

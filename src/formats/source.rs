@@ -1,8 +1,8 @@
-//! Reading an input file whole, decompressing gzip and Zstandard data on the way.
+//! Reading an input file, whole or piece by piece, decompressing gzip and Zstandard data on the way.
 
 use crate::error::{Error, Result};
 use std::ffi::OsStr;
-use std::io::Read;
+use std::io::{BufRead, BufReader, Cursor, Read};
 use std::path::Path;
 
 const GZIP_MAGIC: &[u8] = &[0x1f, 0x8b];
@@ -12,25 +12,135 @@ const ZSTD_MAGIC: &[u8] = &[0x28, 0xb5, 0x2f, 0xfd];
 const FREE_EXPANSION: u64 = 256 << 20;
 /// Beyond that it may grow this many times. Text meshes reach 6, a flat generated grid about 50; bombs 1000 and more.
 const MAX_RATIO: u64 = 200;
+/// Bytes that are unpacked before the limit is looked at again.
+const PIECE: usize = 1 << 20;
 
-/// The bytes of the file at `path`; what gzip or Zstandard packed is unpacked, recognised by its first bytes and not
-/// by its name. Several packed streams one after another read as one.
-///
-/// # Errors
-/// [`Error::File`] if the file cannot be opened or read; [`Error::Content`] if packed data is damaged, or expands to
-/// more than 256 MiB and 200 times its size (a decompression bomb).
-pub fn read(path: &Path) -> Result<Vec<u8>> {
-    let bytes = read_raw(path)?;
-    let packed = bytes.len() as u64;
-    let limit = FREE_EXPANSION.max(packed.saturating_mul(MAX_RATIO));
-    if bytes.starts_with(GZIP_MAGIC) {
-        unpack(path, "gzip", flate2::read::MultiGzDecoder::new(&bytes[..]), limit)
-    } else if bytes.starts_with(ZSTD_MAGIC) {
-        unpack(path, "Zstandard", ZstdFrames::new(&bytes), limit)
-    } else {
-        refuse_misnamed(path, &bytes)?;
+/// The bytes of a file, read from start to end; what gzip or Zstandard packed is unpacked on the way, recognised by its
+/// first bytes and not by its name. Several packed streams one after another read as one.
+pub struct Source<'a> {
+    path: &'a Path,
+    stream: Box<dyn Read + Send + 'a>,
+    /// How it is packed.
+    packing: Option<&'static str>,
+    /// Bytes that may still come of packed data, and that might in all.
+    left: u64,
+    limit: u64,
+    /// Bytes in all, where known.
+    size: Option<u64>,
+}
+
+impl<'a> Source<'a> {
+    /// Opens the file at `path`.
+    ///
+    /// # Errors
+    /// [`Error::File`] if the file cannot be opened or read; [`Error::Content`] if it is empty, or not packed though
+    /// its name says so.
+    pub fn open(path: &'a Path) -> Result<Self> {
+        let fail = |e: std::io::Error| Error::file(path, "read", e);
+        let mut file = std::fs::File::open(path).map_err(|e| Error::file(path, "open", e))?;
+        let meta = file.metadata().map_err(fail)?;
+        if meta.is_dir() {
+            return Err(Error::file(path, "read", "it is a folder"));
+        }
+        let mut head = Vec::new();
+        (&mut file).take(ZSTD_MAGIC.len() as u64).read_to_end(&mut head).map_err(fail)?;
+        let limit = FREE_EXPANSION.max(meta.len().saturating_mul(MAX_RATIO));
+        let (is_gzip, is_zstd) = (head.starts_with(GZIP_MAGIC), head.starts_with(ZSTD_MAGIC));
+        if !is_gzip && !is_zstd {
+            refuse_misnamed(path, &head)?;
+        }
+        let whole = Cursor::new(head).chain(file);
+        let (stream, packing): (Box<dyn Read + Send>, _) = if is_gzip {
+            (Box::new(flate2::bufread::MultiGzDecoder::new(BufReader::new(whole))), Some("gzip"))
+        } else if is_zstd {
+            (Box::new(ZstdFrames::new(BufReader::new(whole))), Some("Zstandard"))
+        } else {
+            (Box::new(whole), None)
+        };
+        let size = (meta.is_file() && packing.is_none()).then_some(meta.len());
+        Ok(Source { path, stream, packing, left: limit, limit, size })
+    }
+
+    /// Of bytes that are in memory, as they are; `path` is for messages.
+    pub fn of_bytes(path: &'a Path, bytes: &'a [u8]) -> Self {
+        let size = bytes.len() as u64;
+        Source { path, stream: Box::new(bytes), packing: None, left: size, limit: size, size: Some(size) }
+    }
+
+    /// Appends the next `count` bytes to `buffer`, or what is left if that is less; returns how many.
+    ///
+    /// # Errors
+    /// [`Error::File`] if the file cannot be read; [`Error::Content`] if packed data is damaged, or expands to more
+    /// than 256 MiB and 200 times its size (a decompression bomb).
+    pub fn fill(&mut self, buffer: &mut Vec<u8>, count: usize) -> Result<usize> {
+        let read = (&mut self.stream).take(count as u64).read_to_end(buffer);
+        let read = read.map_err(|e| match self.packing {
+            None => Error::file(self.path, "read", e),
+            Some(packing) => {
+                Error::content(self.path, format!("the {packing} data is damaged or cut short: {e}"))
+            }
+        })?;
+        if let Some(packing) = self.packing {
+            self.left = self.left.checked_sub(read as u64).ok_or_else(|| self.too_large(packing))?;
+        }
+        Ok(read)
+    }
+
+    /// Bytes in all, where that is known before they are read: not of packed data, nor of a pipe.
+    pub fn size(&self) -> Option<u64> {
+        self.size
+    }
+
+    /// All bytes that are left.
+    ///
+    /// # Errors
+    /// Those of [`Source::read_rest`].
+    pub fn read_all(mut self) -> Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        self.read_rest(&mut bytes)?;
         Ok(bytes)
     }
+
+    /// Appends all bytes that are left to `bytes`, which holds those before.
+    ///
+    /// # Errors
+    /// Those of [`Source::fill`]; [`Error::File`] for a file that does not fit in memory.
+    pub fn read_rest(&mut self, bytes: &mut Vec<u8>) -> Result<()> {
+        if let Some(size) = self.size {
+            // A size that memory cannot hold is an error here and not an abort further on. The byte more spares the
+            // vector a doubling when it looks for the end.
+            let left = size.saturating_add(1).saturating_sub(bytes.len() as u64);
+            bytes.try_reserve_exact(usize::try_from(left).unwrap_or(usize::MAX)).map_err(|_| {
+                Error::file(self.path, "read", format!("its {} MiB do not fit in memory", size >> 20))
+            })?;
+        }
+        loop {
+            // Packed data is asked for piece by piece, so that a bomb ends at its limit.
+            let more = if self.packing.is_some() { PIECE } else { usize::MAX };
+            if self.fill(bytes, more)? < more {
+                return Ok(());
+            }
+        }
+    }
+
+    fn too_large(&self, packing: &str) -> Error {
+        Error::content(
+            self.path,
+            format!(
+                "the {packing} data expands to more than {} MiB, over {MAX_RATIO} times its size; \
+                 if it is to be trusted, unpack it first",
+                self.limit >> 20
+            ),
+        )
+    }
+}
+
+/// The bytes of the file at `path`, as [`Source`] gives them.
+///
+/// # Errors
+/// Those of [`Source::open`] and [`Source::read_all`].
+pub fn read(path: &Path) -> Result<Vec<u8>> {
+    Source::open(path)?.read_all()
 }
 
 /// The extension that tells what is in the file, in lower case, with `.gz` or `.zst` stripped: `ply` for
@@ -43,42 +153,6 @@ pub fn content_extension(path: &Path) -> Option<String> {
 
 fn is_packer(extension: &str) -> bool {
     matches!(extension, "gz" | "zst")
-}
-
-fn read_raw(path: &Path) -> Result<Vec<u8>> {
-    let fail = |e: std::io::Error| Error::file(path, "read", e);
-    let mut file = std::fs::File::open(path).map_err(|e| Error::file(path, "open", e))?;
-    let meta = file.metadata().map_err(fail)?;
-    if meta.is_dir() {
-        return Err(Error::file(path, "read", "it is a folder"));
-    }
-    let mut bytes = Vec::new();
-    // A size that memory cannot hold is an error here and not an abort further on.
-    bytes.try_reserve_exact(usize::try_from(meta.len()).unwrap_or(usize::MAX)).map_err(|_| {
-        Error::file(path, "read", format!("its {} MiB do not fit in memory", meta.len() >> 20))
-    })?;
-    file.read_to_end(&mut bytes).map_err(fail)?;
-    Ok(bytes)
-}
-
-fn unpack(path: &Path, packing: &str, mut stream: impl Read, limit: u64) -> Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    stream
-        .by_ref()
-        .take(limit + 1)
-        .read_to_end(&mut bytes)
-        .map_err(|e| Error::content(path, format!("the {packing} data is damaged or cut short: {e}")))?;
-    if bytes.len() as u64 > limit {
-        return Err(Error::content(
-            path,
-            format!(
-                "the {packing} data expands to more than {} MiB, over {MAX_RATIO} times its size; \
-                 if it is to be trusted, unpack it first",
-                limit >> 20
-            ),
-        ));
-    }
-    Ok(bytes)
 }
 
 fn refuse_misnamed(path: &Path, bytes: &[u8]) -> Result<()> {
@@ -96,28 +170,28 @@ fn refuse_misnamed(path: &Path, bytes: &[u8]) -> Result<()> {
 
 /// All frames of Zstandard data, one after another (`cat a.zst b.zst`, or what a parallel packer writes); frames
 /// marked to be skipped are (RFC 8878, 3.1.2).
-struct ZstdFrames<'a> {
-    rest: &'a [u8],
+struct ZstdFrames<R> {
+    packed: R,
     decoder: ruzstd::decoding::FrameDecoder,
     in_frame: bool,
 }
 
-impl<'a> ZstdFrames<'a> {
-    fn new(bytes: &'a [u8]) -> Self {
-        ZstdFrames { rest: bytes, decoder: ruzstd::decoding::FrameDecoder::new(), in_frame: false }
+impl<R: BufRead> ZstdFrames<R> {
+    fn new(packed: R) -> Self {
+        ZstdFrames { packed, decoder: ruzstd::decoding::FrameDecoder::new(), in_frame: false }
     }
 
     /// Enters the next frame; `false` at the end of the data.
     fn next_frame(&mut self) -> std::io::Result<bool> {
         use ruzstd::decoding::errors::{FrameDecoderError, ReadFrameHeaderError};
-        while !self.rest.is_empty() {
-            match self.decoder.init(&mut self.rest) {
+        while !self.packed.fill_buf()?.is_empty() {
+            match self.decoder.init(&mut self.packed) {
                 Ok(()) => return Ok(true),
                 Err(FrameDecoderError::ReadFrameHeaderError(ReadFrameHeaderError::SkipFrame {
                     length,
                     ..
                 })) => {
-                    self.rest = self.rest.get(length as usize..).unwrap_or_default();
+                    std::io::copy(&mut (&mut self.packed).take(u64::from(length)), &mut std::io::sink())?;
                 }
                 Err(e) => return Err(std::io::Error::other(e)),
             }
@@ -126,7 +200,7 @@ impl<'a> ZstdFrames<'a> {
     }
 }
 
-impl Read for ZstdFrames<'_> {
+impl<R: BufRead> Read for ZstdFrames<R> {
     fn read(&mut self, buf: &mut [u8]) -> std::io::Result<usize> {
         use ruzstd::decoding::BlockDecodingStrategy::UptoBlocks;
         loop {
@@ -142,7 +216,7 @@ impl Read for ZstdFrames<'_> {
             if self.decoder.is_finished() {
                 self.in_frame = false;
             } else {
-                self.decoder.decode_blocks(&mut self.rest, UptoBlocks(1)).map_err(std::io::Error::other)?;
+                self.decoder.decode_blocks(&mut self.packed, UptoBlocks(1)).map_err(std::io::Error::other)?;
             }
         }
     }

@@ -117,3 +117,20 @@ fn packed_meshes_load_as_plain_ones() {
     std::fs::write(&packed, ruzstd::encoding::compress_to_vec(text.as_bytes(), level)).unwrap();
     assert_eq!(load_mesh(&packed).unwrap(), load_mesh(&plain).unwrap());
 }
+
+#[test]
+fn packed_headers_are_held_against_what_is_unpacked() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.ply.zst");
+    for format in ["ascii", "binary_little_endian"] {
+        // Room for 4e9 vertices would be 48 GB.
+        let text = format!(
+            "ply\nformat {format} 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\n\
+             element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n"
+        );
+        let level = ruzstd::encoding::CompressionLevel::Fastest;
+        std::fs::write(&path, ruzstd::encoding::compress_to_vec(text.as_bytes(), level)).unwrap();
+        let e = load_mesh(&path).unwrap_err();
+        assert!(e.exit_code() == 2 && e.to_string().contains("promises 4000000000 records"), "{e}");
+    }
+}

@@ -40,15 +40,18 @@ impl FaceMaterials {
         self.number = None;
     }
 
-    /// One more face under the current material. Fails beyond 65536 materials.
-    pub fn count_face(&mut self) -> Result<(), String> {
+    /// So many more faces under the current material. Fails beyond 65536 materials.
+    pub fn add_faces(&mut self, faces: usize) -> Result<(), String> {
+        if faces == 0 {
+            return Ok(());
+        }
         let number = match self.number {
             Some(number) => number,
             None => self.number_of_current()?,
         };
         match self.runs.last_mut() {
-            Some(run) if run.material == number => run.faces += 1,
-            _ => self.runs.push(Run { material: number, faces: 1 }),
+            Some(run) if run.material == number => run.faces += faces,
+            _ => self.runs.push(Run { material: number, faces }),
         }
         Ok(())
     }

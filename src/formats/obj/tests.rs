@@ -1,5 +1,6 @@
 use super::*;
 use crate::base::mesh_data::MeshMaterial;
+use crate::testing::TestRng;
 
 fn read(text: impl AsRef<[u8]>) -> Result<MeshData> {
     parse(Path::new("a.obj"), text.as_ref())
@@ -121,20 +122,23 @@ fn what_is_no_surface_is_counted() {
 #[test]
 fn errors_name_the_line_and_what_is_wrong() {
     let cases = [
-        ("f 1 2 5\n", "a.obj:5: there is no position 5; the file has 4"),
-        ("f 1/1 2/2 3/1\nvt 0 0", "a.obj:5: there is no texture coordinate 2; the file has 1"),
-        ("f 1//2 2//1 3//1\nvn 0 0 1\nf 1//1 2//1 3//1", "a.obj:5: there is no normal 2; the file has 1"),
-        ("\nf 1 2 0\n", "a.obj:6: \"0\" is no corner of a face: indices count from 1"),
-        ("f 1 2 -5\n", "\"-5\" is no corner of a face: it counts back over the start; so far there are 4"),
-        ("f 1 2 x\n", "\"x\" is no corner of a face"),
+        ("f 1 2 5\n", "a.obj:5:7: there is no position 5; the file has 4"),
+        ("f 1/1 2/2 3/1\nvt 0 0", "a.obj:5:7: there is no texture coordinate 2; the file has 1"),
+        ("f 1//2 2//1 3//1\nvn 0 0 1\nf 1//1 2//1 3//1", "a.obj:5:3: there is no normal 2; the file has 1"),
+        ("\nf 1 2 0\n", "a.obj:6:7: \"0\" is no corner of a face: indices count from 1"),
+        (
+            "f 1 2 -5\n",
+            "a.obj:5:7: \"-5\" is no corner of a face: it counts back over the start; so far there are 4",
+        ),
+        ("f 1 2 x\n", "a.obj:5:7: \"x\" is no corner of a face"),
         ("f 1 2 3/1/1/1\n", "it must be position, position/uv"),
-        ("f 1 2 \\\n 3 \\\n 4.5\nf 1 2 3", "a.obj:5: \"4.5\" is no corner"),
-        ("v 1 2\nf 1 2 3", "a.obj:5: a position needs 3 numbers, here are 2"),
-        ("vn 1 # 2 3\nf 1 2 3", "a.obj:5: a normal needs 3 numbers, here are 1"),
+        ("f 1 2 \\\n 3 \\\n 4.5\nf 1 2 3", "a.obj:7:2: \"4.5\" is no corner"),
+        ("v 1 2\nf 1 2 3", "a.obj:5:1: a position needs 3 numbers, here are 2"),
+        ("vn 1 # 2 3\nf 1 2 3", "a.obj:5:1: a normal needs 3 numbers, here are 1"),
         ("vt\nf 1 2 3", "a texture coordinate needs 2 numbers, here are 0"),
-        ("v 1 x 2\nf 1 2 3", "a.obj:5: a position is \"v x y z\" with three numbers"),
-        ("vn 1 \u{e4} 2\nf 1 2 3", "a.obj:5: a normal is"),
-        ("vt 1,5 2\nf 1 2 3", "a.obj:5: a texture coordinate is"),
+        ("v 1 x 2\nf 1 2 3", "a.obj:5:5: a position is \"v x y z\" with three numbers"),
+        ("vn 1 \u{e4} 2\nf 1 2 3", "a.obj:5:6: a normal is"),
+        ("vt 1,5 2\nf 1 2 3", "a.obj:5:4: a texture coordinate is"),
     ];
     for (text, want) in cases {
         let got = message(format!("{SQUARE}{text}"));
@@ -206,5 +210,93 @@ fn no_cut_and_no_changed_byte_panics() {
             changed[i] = byte;
             check(&changed);
         }
+    }
+}
+
+/// The same in blocks of any size and by any number of threads.
+fn read_in_blocks(text: &[u8], size: usize, threads: usize) -> Result<MeshData> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let path = Path::new("a.obj");
+    pool.install(|| read_blocks(path, Blocks::of_size(Source::of_bytes(path, text), size)))
+}
+
+#[test]
+fn neither_blocks_nor_threads_change_the_mesh_or_the_error() {
+    let head = format!("{SQUARE}vt 0 0.5\nvt 1 0.5\nvn 0 0 1\nvn 0 1 1\nvn 0 0 2\n");
+    let good = format!(
+        "{head}f 1 2 3\nusemtl a\nf 1/1 2/1 3/2\n# \\\nf -4//-1 -3//-2 -2//-3 -1//-1\nv 0 0 1\nl 1 2\nf 1//1 2//2\n\
+         f 1/1/1 2/2/2 \\\n 3/1/3 \\\n\nusemtl b\nvt 0.5 0.5\nvt 0.25 0.25\nvt 0 0\nf 1/1/1 2/2/2 5/5/1\nusemtl a\nf -1/-1/-1 -2/-2/-2 -3/-3/-3\n"
+    );
+    let bad = [
+        "f 1 2 3\nf 1 2 77 # the highest\nf 1 2 9\n",
+        "f 1/3 2/9 3/1\nf 1//4 2 3\n",
+        "f 1 2 3\nf -4 -3 -5\nf 1 2 x\nv\n",
+        "f 1 2 3\nv 1 2 x\nf -4 -3 -9\n",
+        "p 1\n",
+    ];
+    let texts = bad.map(|tail| format!("{head}{tail}"));
+    for text in std::iter::once(&good).chain(&texts) {
+        let want = read(text);
+        assert_eq!(want.is_ok(), *text == good, "{want:?}");
+        for size in [1, 7, 16, 33, 100, 1000] {
+            for threads in [1, 2, 5] {
+                let got = read_in_blocks(text.as_bytes(), size, threads);
+                assert_eq!(format!("{got:?}"), format!("{want:?}"), "{text:?} {size} {threads}");
+            }
+        }
+    }
+}
+
+/// A mesh as the `tobj` crate reads it.
+fn read_by_tobj(text: &str) -> MeshData {
+    let options = tobj::LoadOptions { single_index: true, ..tobj::LoadOptions::default() };
+    let no_materials = |_: &Path| Ok((Vec::new(), Default::default()));
+    let (models, _) = tobj::load_obj_buf(&mut text.as_bytes(), &options, no_materials).unwrap();
+    let [model] = &models[..] else { panic!("one model") };
+    let mesh = &model.mesh;
+    MeshData {
+        positions: Positions::F64(mesh.positions.as_chunks().0.to_vec()),
+        normals: mesh.normals.as_chunks().0.iter().map(|n| n.map(|c| c as f32)).collect(),
+        uvs: mesh.texcoords.as_chunks().0.iter().map(|t| t.map(|c| c as f32)).collect(),
+        indices: mesh.indices.as_chunks().0.to_vec(),
+        material_ids: Vec::new(),
+        materials: Vec::new(),
+        repairs: Repairs::default(),
+    }
+}
+
+#[test]
+fn random_meshes_are_as_another_reader_has_them() {
+    let mut rng = TestRng::new(11);
+    for case in 0..400 {
+        let mut below = |n: usize| (rng.f64() * n as f64) as usize;
+        let count = 3 + below(60);
+        let mut text = String::new();
+        for _ in 0..count {
+            let mut number = || {
+                let x = (below(2_000_001) as f64 - 1e6) / 3e5;
+                [format!("{x}"), format!("{x:.3}"), format!("{x:e}"), format!("{}", x as f32)][below(4)]
+                    .clone()
+            };
+            text += &format!("v {} {} {}\n", number(), number(), number());
+            text += &format!("vt {} {}\nvn {} {} 1\n", number(), number(), number(), number());
+        }
+        for _ in 0..1 + below(100) {
+            text += "f";
+            for _ in 0..3 {
+                let [p, t, n] = [0; 3].map(|_| 1 + below(count));
+                // All numbers equal, none but the first, two kinds, any three; counted back.
+                text += &match case % 6 {
+                    0 => format!(" {p}/{p}/{p}"),
+                    1 => format!(" {p}"),
+                    2 => format!(" {p}//{n}"),
+                    3 => format!(" {p}/{t}"),
+                    4 => format!(" {p}/{t}/{n}"),
+                    _ => format!(" -{p}/-{t}/-{n}"),
+                };
+            }
+            text += "\n";
+        }
+        assert_eq!(read(&text).unwrap(), read_by_tobj(&text), "{text}");
     }
 }

@@ -6,7 +6,7 @@
 use super::faces::Faces;
 use super::header::{Element, Kind};
 use super::words::read_words;
-use super::{Columns, Plan, Role, Tables, is_far_away};
+use super::{Columns, Plan, Role, Tables, Text, is_far_away};
 use crate::base::mesh_data::Positions;
 use crate::error::Result;
 use fast_float2::FastFloat;
@@ -18,24 +18,24 @@ const PIECE: usize = 1 << 14;
 const BLOCK: usize = 1 << 16;
 
 /// Reads all elements.
-pub fn read(plan: &Plan) -> Result<Tables> {
-    if let Some(tables) = read_lines(plan) {
+pub fn read(plan: &Plan, text: Text) -> Result<Tables> {
+    if let Some(tables) = read_lines(plan, text) {
         return Ok(tables);
     }
-    let by_words = read_words(plan, false);
+    let by_words = read_words(plan, text, false);
     // Words left over mean that some line held more than was declared, unless reading by lines finds the same.
     if matches!(by_words, Ok((_, true))) {
         return by_words.map(|(tables, _)| tables);
     }
-    match read_words(plan, true) {
+    match read_words(plan, text, true) {
         Ok((tables, _)) => Ok(tables),
         Err(_) => by_words.map(|(tables, _)| tables),
     }
 }
 
 /// The fast reader; `None` where the file needs the general one, be it odd or damaged.
-fn read_lines(plan: &Plan) -> Option<Tables> {
-    let lines = Lines::new(&plan.bytes[plan.body..]);
+fn read_lines(plan: &Plan, text: Text) -> Option<Tables> {
+    let lines = Lines::new(&text.bytes[text.body..]);
     let mut tables = Tables::new(plan);
     let mut line = 0;
     for (element, role) in &plan.elements {

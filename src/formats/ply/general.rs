@@ -14,7 +14,7 @@ pub trait Values {
     /// Whether so many numbers of this type can still follow.
     fn can_hold(&self, count: usize, kind: Scalar) -> bool;
     /// An error at the place of the number read last.
-    fn fail(&self, message: String) -> Error;
+    fn fail(&mut self, message: String) -> Error;
 }
 
 /// Reads one element and adds what it says to `tables`.

@@ -6,7 +6,7 @@ use crate::error::{Error, Result, unknown_name};
 use std::path::Path;
 
 /// A header longer than this is none.
-const MAX_HEADER: usize = 1 << 20;
+pub const MAX_HEADER: usize = 1 << 20;
 
 /// How the values after the header are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -159,12 +159,13 @@ pub struct Header {
     pub body: usize,
 }
 
-/// Reads the header of `bytes`. `path` is for messages.
+/// Reads the header that `bytes` start with, at least [`MAX_HEADER`] of them or the whole file of `size` bytes. `path` is
+/// for messages.
 ///
 /// # Errors
 /// [`Error::Content`] with the line for anything that is no PLY header, and if the file is too short for the counts
 /// that the header promises: what is allocated afterwards is bounded by the file's length.
-pub fn parse(path: &Path, bytes: &[u8]) -> Result<Header> {
+pub fn parse(path: &Path, bytes: &[u8], size: u64) -> Result<Header> {
     let mut lines = HeaderLines { path, bytes, at: 0, line: 0 };
     if lines.next()?.trim_ascii() != b"ply" {
         return Err(lines.fail("not a PLY file: its first line is not \"ply\""));
@@ -205,7 +206,7 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<Header> {
     }
     let format = format.ok_or_else(|| lines.fail("the header has no format line"))?;
     let header = Header { format, elements, body: lines.at };
-    check_size(path, &header, bytes.len() - header.body)?;
+    check_size(path, &header, size.saturating_sub(header.body as u64))?;
     Ok(header)
 }
 
@@ -240,7 +241,7 @@ fn parse_property(words: &[&str]) -> Result<Property, String> {
 }
 
 /// Counts against the length of the body. In text a number takes at least a digit and a blank.
-fn check_size(path: &Path, header: &Header, body: usize) -> Result<()> {
+fn check_size(path: &Path, header: &Header, body: u64) -> Result<()> {
     let mut needed = 0u64;
     for element in &header.elements {
         let record = match header.format {
@@ -249,7 +250,7 @@ fn check_size(path: &Path, header: &Header, body: usize) -> Result<()> {
         };
         needed = needed.saturating_add((element.count as u64).saturating_mul(record as u64));
         // The last number of a text needs no blank after it.
-        if needed > body as u64 + 1 {
+        if needed > body + 1 {
             return Err(Error::content(
                 path,
                 format!(
@@ -305,7 +306,7 @@ mod tests {
     use super::*;
 
     fn read(text: &str) -> Result<Header> {
-        parse(Path::new("a.ply"), text.as_bytes())
+        parse(Path::new("a.ply"), text.as_bytes(), text.len() as u64)
     }
 
     const GOOD: &str = "ply\nformat binary_big_endian 1.0\ncomment made by hand\nobj_info x\nelement vertex 2\n\

@@ -271,3 +271,71 @@ fn what_is_written_reads_back() {
     assert_eq!(write_ply(&dir.path().join("absent/out.ply"), &mesh).unwrap_err().exit_code(), 3);
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1, "no temporary file is left");
 }
+
+/// A file of many windows: triangles, here and there a quadrilateral, and (where lengths have four bytes) one polygon of
+/// 100,000 corners; as text, or binary.
+fn long_file(format: Format, length: &str) -> Vec<u8> {
+    let (name, big) = match format {
+        Format::Ascii => ("ascii", false),
+        Format::LittleEndian => ("binary_little_endian", false),
+        Format::BigEndian => ("binary_big_endian", true),
+    };
+    let (vertices, faces) = (100_000u32, 60_000u32);
+    let mut out = format!(
+        "ply\nformat {name} 1.0\nelement vertex {vertices}\nproperty double x\nproperty double y\nproperty double z\n\
+         element face {faces}\nproperty list {length} int vertex_indices\nend_header\n"
+    )
+    .into_bytes();
+    let text = format == Format::Ascii;
+    let bytes = |value: &[u8]| if big { value.iter().rev().copied().collect() } else { value.to_vec() };
+    for i in 0..vertices {
+        let angle = f64::from(i) / f64::from(vertices) * std::f64::consts::TAU;
+        // A circle, which in double precision is convex and so quickly cut.
+        let p = [angle.cos(), angle.sin(), 0.0];
+        match text {
+            true => out.extend(format!("{} {} {}\n", p[0], p[1], p[2]).bytes()),
+            false => out.extend(p.iter().flat_map(|c| bytes(&c.to_le_bytes()))),
+        }
+    }
+    for i in 0..faces {
+        let corners: Vec<u32> = match i {
+            30_000 if length == "int" => (0..vertices).collect(),
+            _ if i % 1000 == 7 => (i..i + 4).collect(),
+            _ => (i..i + 3).collect(),
+        };
+        match text {
+            true => {
+                out.extend(corners.len().to_string().bytes());
+                corners.iter().for_each(|c| out.extend(format!(" {c}").bytes()));
+                out.push(b'\n');
+            }
+            false => {
+                let count = (corners.len() as u32).to_le_bytes();
+                out.extend(if length == "int" { bytes(&count) } else { vec![count[0]] });
+                out.extend(corners.iter().flat_map(|c| bytes(&c.to_le_bytes())));
+            }
+        }
+    }
+    out
+}
+
+#[test]
+fn long_binary_files_read_as_text_does() {
+    for length in ["uchar", "int"] {
+        let want = read(long_file(Format::Ascii, length)).unwrap();
+        assert_eq!(want.indices.len(), if length == "int" { 60_060 + 99_997 } else { 60_060 });
+        for format in [Format::LittleEndian, Format::BigEndian] {
+            let whole = long_file(format, length);
+            assert_eq!(read(&whole).unwrap(), want);
+            let cut = message(&whole[..whole.len() - 1]);
+            let place = format!("face 59999 of 60000: the file is cut short here (at byte {})", {
+                whole.len() - if length == "int" { 16 } else { 13 }
+            });
+            assert!(cut.contains(&place), "{cut}");
+            let mut changed = whole.clone();
+            *changed.last_mut().unwrap() = 0x70;
+            *changed.iter_mut().nth_back(3).unwrap() = 0x70;
+            assert!(message(changed).contains("face 59999 of 60000: there is no vertex 18"));
+        }
+    }
+}

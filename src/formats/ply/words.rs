@@ -2,18 +2,18 @@
 
 use super::general::{Values, read_element};
 use super::header::Scalar;
-use super::{Plan, Tables};
+use super::{Plan, Tables, Text};
 use crate::error::{Error, Result};
 use std::path::Path;
 
 /// Reads all elements: the tables, and whether nothing but blanks follows them.
-pub fn read_words(plan: &Plan, by_line: bool) -> Result<(Tables, bool)> {
+pub fn read_words(plan: &Plan, text: Text, by_line: bool) -> Result<(Tables, bool)> {
     let mut tables = Tables::new(plan);
     let mut words = Words {
         path: plan.path,
-        bytes: plan.bytes,
-        at: plan.body,
-        last: plan.body,
+        bytes: text.bytes,
+        at: text.body,
+        last: text.body,
         by_line,
         records: 0,
         odd_lines: 0,
@@ -70,7 +70,7 @@ impl Values for Words<'_> {
         count <= (self.bytes.len() - self.at) / 2
     }
 
-    fn fail(&self, message: String) -> Error {
+    fn fail(&mut self, message: String) -> Error {
         let line = 1 + self.bytes[..self.last].iter().filter(|&&b| b == b'\n').count();
         Error::content_at(self.path, line, 0, message)
     }
