@@ -192,7 +192,7 @@ fn save(folder: &Path, entry: &Entry, kernel: &Kernel, linear: &Pixels, pair: &P
     let name = |what: &str| folder.join(format!("{scene}-{stem}-{}-{what}.exr", kernel.name));
     let both = pair.ours.data.iter().zip(&pair.reference.data);
     let data = both.map(|(a, b)| [0, 1, 2].map(|c| a[c] - b[c])).collect();
-    write(&linear, &name("ours"))?;
+    write(linear, &name("ours"))?;
     write(&Pixels { data, ..pair.ours }, &name("difference"))
 }
 
