@@ -115,13 +115,23 @@ impl Vertex {
         Ray::new(self.spawn_origin(w), w, key)
     }
 
-    /// A ray towards a point at `dist` along `w`, ending short of what stands there by a few roundings.
+    /// A ray towards a point at `dist` along `w` from here, ending short of what stands there by a few roundings.
     #[inline]
     pub fn spawn_to(&self, w: Vec3, dist: f32, key: u32) -> Ray {
         let o = self.spawn_origin(w);
+        if !dist.is_finite() {
+            return Ray { o, d: w, tnear: 0.0, tfar: dist, key };
+        }
+        // Aimed anew from where it starts: along `w` it would run beside what was sampled by the step off this surface,
+        // and meet a lamp that it grazes before its end.
+        let to = self.p.as_dvec3() + w.as_dvec3() * f64::from(dist) - o.as_dvec3();
+        let length = to.length();
+        if !(length > 0.0) {
+            return Ray { o, d: w, tnear: 0.0, tfar: 0.0, key };
+        }
         // A relative 1e-5 is 80 roundings: more than the error of any sampled point at that distance, and too
         // thin to hide a blocker.
-        Ray { o, d: w, tnear: 0.0, tfar: if dist.is_finite() { dist * (1.0 - 1e-5) } else { dist }, key }
+        Ray { o, d: (to / length).as_vec3(), tnear: 0.0, tfar: (length * (1.0 - 1e-5)) as f32, key }
     }
 
     /// This point as a light sees it: the side on which `wo` lies.

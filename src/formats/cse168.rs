@@ -9,8 +9,7 @@ use super::commands::looks::{Look, Looks};
 use super::commands::soup::Soup;
 use super::commands::stack::TransformStack;
 use super::commands::statements::{Skipped, Statement, for_each};
-use super::commands::{camera, film_size, node, numbers, object};
-use super::seed::{attenuation, output, radius};
+use super::commands::{attenuation, camera, film_size, light, node, numbers, object, output, radius};
 use crate::base::registry::{Node, Value};
 use crate::color::Transfer;
 use crate::error::{Place, Result};
@@ -162,7 +161,9 @@ impl<'a> Reader<'a> {
                 self.soup.reserve(count, self.bytes);
             }
             "maxvertnorms" => drop(s.integer(0, i64::from(u32::MAX))?),
-            "directional" | "point" => self.light(s)?,
+            "directional" | "point" => {
+                self.scene.lights.push(light(s, self.stack.top(), self.attenuation)?);
+            }
             "attenuation" => self.attenuation = attenuation(s)?,
             "quadLight" => self.quad_light(s)?,
             "gamma" => {
@@ -255,26 +256,6 @@ impl<'a> Reader<'a> {
         let place = s.place();
         let params = vec![("center", numbers(s.vector()?)), ("radius", Value::Number(radius(s)?))];
         self.objects.push((node("sphere", &place, params), self.look.clone(), self.stack.top()));
-        Ok(())
-    }
-
-    fn light(&mut self, s: &mut Statement) -> Result<()> {
-        let place = s.place();
-        let (at, color) = (DVec3::from_array(s.vector()?), s.color()?);
-        let top = self.stack.top();
-        let light = if s.word == "point" {
-            let params = vec![
-                ("position", numbers(top.transform_point3(at).to_array())),
-                ("intensity", numbers(color)),
-                ("attenuation", numbers(self.attenuation)),
-            ];
-            node("point", &place, params)
-        } else {
-            let direction = -top.transform_vector3(at);
-            let params = vec![("direction", numbers(direction.to_array())), ("irradiance", numbers(color))];
-            node("directional", &place, params)
-        };
-        self.scene.lights.push(light);
         Ok(())
     }
 

@@ -17,7 +17,7 @@ use super::commands::looks::{Look, Looks};
 use super::commands::soup::Soup;
 use super::commands::stack::TransformStack;
 use super::commands::statements::{Skipped, Statement, for_each};
-use super::commands::{camera, film_size, locate, node, numbers, object};
+use super::commands::{attenuation, camera, film_size, light, locate, node, numbers, object, output, radius};
 use crate::base::image_data::Encoding;
 use crate::base::registry::{Node, Value};
 use crate::color::Transfer;
@@ -141,7 +141,9 @@ impl<'a> Reader<'a> {
             "sph" | "elp" => self.quadric(s)?,
             "mesh" => self.mesh(s)?,
             "OBJ" => self.obj(s)?,
-            "directional" | "point" => self.light(s)?,
+            "directional" | "point" => {
+                self.scene.lights.push(light(s, self.stack.top(), self.attenuation)?);
+            }
             "attenuation" => self.attenuation = attenuation(s)?,
             "matType" => self.look.extra.is_mirror = s.choice(&["Normal", "Mirror"])? == "Mirror",
             // The files' own first bytes say what they are.
@@ -209,30 +211,6 @@ impl<'a> Reader<'a> {
         Ok(Value::Node(Box::new(node("image", place, params))))
     }
 
-    fn light(&mut self, s: &mut Statement) -> Result<()> {
-        let place = s.place();
-        let (at, color) = (DVec3::from_array(s.vector()?), s.color()?);
-        let top = self.stack.top();
-        let light = if s.word == "point" {
-            let params = vec![
-                ("position", numbers(top.transform_point3(at).to_array())),
-                ("intensity", numbers(color)),
-                ("attenuation", numbers(self.attenuation)),
-            ];
-            node("point", &place, params)
-        } else {
-            // The file says where the light is; ours say where it shines.
-            let direction = -top.transform_vector3(at);
-            node(
-                "directional",
-                &place,
-                vec![("direction", numbers(direction.to_array())), ("irradiance", numbers(color))],
-            )
-        };
-        self.scene.lights.push(light);
-        Ok(())
-    }
-
     /// `skybox PATH [INTENSITY]`; the path may have blanks.
     fn skybox(&mut self, s: &mut Statement) -> Result<()> {
         let text = s.remainder("a folder of pictures")?;
@@ -278,32 +256,8 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// The command line says where a picture goes.
-pub(super) fn output(s: &mut Statement, scene: &mut SceneDesc) {
-    let named = s.remainder("a picture").unwrap_or_default();
-    let what = format!("the picture's name, {named}: it is given when rendering");
-    scene.losses.push(Loss { section: "film", place: s.place(), what });
-}
-
 fn mesh_node(place: &Place, mesh: Value) -> Node {
     node("mesh", place, vec![("path", mesh), ("missing_uv", Value::Text("barycentric".into()))])
-}
-
-/// A radius of more than 0.
-pub(super) fn radius(s: &mut Statement) -> Result<f64> {
-    match s.number()? {
-        r if r > 0.0 => Ok(r),
-        r => Err(s.error(format!("`{}` takes a radius of more than 0, not {r}", s.word))),
-    }
-}
-
-/// Constant, linear and quadratic terms, not all 0.
-pub(super) fn attenuation(s: &mut Statement) -> Result<[f64; 3]> {
-    let terms = s.color()?;
-    if terms == [0.0; 3] {
-        return Err(s.error("`attenuation` takes three numbers that are not all 0"));
-    }
-    Ok(terms)
 }
 
 fn material(look: &Look, compat: Compat, texture: Option<Value>, place: &Place) -> Node {

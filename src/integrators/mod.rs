@@ -7,6 +7,7 @@ pub mod direct;
 mod escapes;
 pub mod normals;
 pub mod path;
+mod pending;
 mod points;
 mod surface;
 pub mod whitted;

@@ -2,6 +2,7 @@
 //! multiple importance sampling (Veach 1997, ch. 9), long paths end by Russian roulette.
 
 use super::escapes::Escapes;
+use super::pending::{Pending, ShadowRays, add_arriving};
 use super::points::VertexPoints;
 use super::surface::Surface;
 use super::{CameraBatch, FirstHit, Integrator, PathIds, PathResults, Workspace};
@@ -83,17 +84,6 @@ pub(super) struct PathState {
     pub eta2: f32,
     /// Index into the block.
     pub index: u32,
-}
-
-/// A light sample that waits for its shadow ray.
-#[derive(Clone, Copy)]
-pub(super) struct Pending {
-    /// What the path brings: radiance, or what radiance is to be multiplied by.
-    pub value: Rgb,
-    /// Index into the block.
-    pub index: u32,
-    /// The light that has to be asked for the radiance, if it did not say.
-    pub ask: Option<u32>,
 }
 
 /// Path states, kept from block to block.
@@ -280,20 +270,13 @@ impl Block<'_> {
         work.counts.shadow += work.shadow.len() as u64;
         self.scene.kernel.occluded_batch(&work.shadow, &mut work.blocked, Coherence::Incoherent);
         let PathScratch { pending, escapes, .. } = paths;
-        let arriving = || (0..).zip(&*pending).filter(|(i, _)| !work.blocked[*i as usize]);
-        for (_, p) in arriving().filter(|(_, p)| p.ask.is_none()) {
-            out.li[p.index as usize] += p.value;
-        }
-        for &light in &self.scene.lights.at_infinity {
-            escapes.clear();
-            for (i, _) in arriving().filter(|(_, p)| p.ask == Some(light)) {
-                escapes.push(i, work.shadow.direction(i as usize));
-            }
-            for e in escapes.ask(&*self.scene.lights.list[light as usize]) {
-                let p = &pending[e.number as usize];
-                out.li[p.index as usize] += p.value * e.le;
-            }
-        }
+        add_arriving(
+            self.scene,
+            pending,
+            ShadowRays { rays: &work.shadow, blocked: &work.blocked },
+            escapes,
+            &mut out.li,
+        );
     }
 
     /// The last rays of paths in a scene where only what lies at infinity shines: any hit ends them in the dark.

@@ -5,7 +5,8 @@
 
 use super::PathId;
 use super::Workspace;
-use super::path::{Block, PathScratch, PathState, PathTracer, Pending};
+use super::path::{Block, PathScratch, PathState, PathTracer};
+use super::pending::Pending;
 use super::points::VertexPoint;
 use crate::base::light::{ChosenLight, LightSample, Receiver};
 use crate::base::material::{Material, Prepared, Transmission};

@@ -4,6 +4,7 @@
 
 use super::escapes::Escapes;
 use super::path::first_hit;
+use super::pending::{Pending, ShadowRays, add_arriving};
 use super::{CameraBatch, Integrator, PathId, PathResults, Workspace};
 use crate::base::hit::HitBatch;
 use crate::base::light::{LightSample, PathEnd, Receiver};
@@ -57,15 +58,6 @@ struct Chain {
     beta: Rgb,
     /// Index into the block.
     index: u32,
-}
-
-/// A shadow ray's promise.
-struct Pending {
-    /// What arrives if nothing blocks, or what the light's radiance is to be multiplied by.
-    value: Rgb,
-    index: u32,
-    /// The light at infinity that has to be asked for its radiance.
-    ask: Option<u32>,
 }
 
 /// A ray that the material drew, which may find a light with an extent: the other half of what light samples bring.
@@ -152,7 +144,10 @@ impl Integrator for Whitted {
             } else {
                 add_escapes(scene, &chains, &mut escapes, out);
             }
-            self.resolve_shadows(scene, work, &mut escapes, &later.pending, out);
+            work.counts.shadow += work.shadow.len() as u64;
+            scene.kernel.occluded_batch(&work.shadow, &mut work.blocked, Coherence::Incoherent);
+            let shadow = ShadowRays { rays: &work.shadow, blocked: &work.blocked };
+            add_arriving(scene, &later.pending, shadow, &mut escapes, &mut out.li);
             self.resolve_scattered(scene, work, &mut escapes, &later, out);
             std::mem::swap(&mut chains, &mut later.next);
             std::mem::swap(&mut rays, &mut work.next);
@@ -289,32 +284,6 @@ impl Whitted {
         }
         if scene.features.emitting_surfaces || !scene.lights.at_infinity.is_empty() {
             spot.scatter(later);
-        }
-    }
-
-    fn resolve_shadows(
-        &self,
-        scene: &Scene,
-        work: &mut Workspace,
-        escapes: &mut Escapes,
-        pending: &[Pending],
-        out: &mut PathResults,
-    ) {
-        work.counts.shadow += work.shadow.len() as u64;
-        scene.kernel.occluded_batch(&work.shadow, &mut work.blocked, Coherence::Incoherent);
-        let arriving = || (0..).zip(pending).filter(|(i, _)| !work.blocked[*i as usize]);
-        for (_, p) in arriving().filter(|(_, p)| p.ask.is_none()) {
-            out.li[p.index as usize] += p.value;
-        }
-        for &light in &scene.lights.at_infinity {
-            escapes.clear();
-            for (i, _) in arriving().filter(|(_, p)| p.ask == Some(light)) {
-                escapes.push(i, work.shadow.direction(i as usize));
-            }
-            for e in escapes.ask(&*scene.lights.list[light as usize]) {
-                let p = &pending[e.number as usize];
-                out.li[p.index as usize] += p.value * e.le;
-            }
         }
     }
 

@@ -129,3 +129,19 @@ fn lamps_and_physical_materials_take_part() {
     let direct = mean(&render(&scene, integrator("direct", &[]), 1024));
     assert_mean("whitted", &classic, direct.value, 6.0, 6.0 * direct.error);
 }
+
+#[test]
+fn a_lamp_that_is_grazed_lights_all_the_same() {
+    // A wall that leans a little, close below the lamp's plane: shadow rays start beside the wall and must not meet the
+    // lamp before their end.
+    let toml = "[film]\nsize = [9, 9]\n[camera]\ntype = \"perspective\"\neye = [300, 540, 280]\nlook_at = [556, 548.2, 280]\n\
+                fov_deg = 0.2\n[materials.m]\ntype = \"diffuse\"\nalbedo = 0.5\n[materials.lamp]\ntype = \"emissive\"\nradiance = 5e4\n\
+                [[objects]]\nmaterial = \"m\"\nshape = { type = \"quad\", corner = [552.8, 0, 0], edge_a = [3.2, 548.8, 0], \
+                edge_b = [0, 0, 559.2] }\n[[objects]]\nmaterial = \"lamp\"\nshape = { type = \"quad\", corner = [213, 548.8, 227], \
+                edge_a = [130, 0, 0], edge_b = [0, 0, 105] }\n";
+    let scene = scene(toml);
+    let exact = mean(&render(&scene, integrator("analytic", &[]), 4));
+    let sampled = mean(&render(&scene, integrator("direct", &[]), 256));
+    assert!(exact.value > 0.01, "the wall is seen, and lit: {}", exact.value);
+    assert_mean("direct", &sampled, exact.value, 6.0, 1e-3 * exact.value);
+}

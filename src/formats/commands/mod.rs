@@ -11,8 +11,8 @@ mod tests;
 use crate::base::registry::{Node, Param, Params, Value};
 use crate::error::{Error, Place, Result};
 use crate::formats::native::check_film;
-use crate::scene::desc::{Content, ObjectDesc};
-use glam::DAffine3;
+use crate::scene::desc::{Content, Loss, ObjectDesc, SceneDesc};
+use glam::{DAffine3, DVec3};
 use statements::Statement;
 use std::path::{Path, PathBuf};
 
@@ -58,6 +58,52 @@ pub(super) fn camera(s: &mut Statement, fov: impl Fn(f64) -> f64) -> Result<Node
         ("fov_deg", Value::Number(fov_deg)),
     ];
     Ok(node("perspective", &s.place(), params))
+}
+
+/// A radius of more than 0.
+pub(super) fn radius(s: &mut Statement) -> Result<f64> {
+    match s.number()? {
+        r if r > 0.0 => Ok(r),
+        r => Err(s.error(format!("`{}` takes a radius of more than 0, not {r}", s.word))),
+    }
+}
+
+/// Constant, linear and quadratic terms, not all 0.
+pub(super) fn attenuation(s: &mut Statement) -> Result<[f64; 3]> {
+    let terms = s.color()?;
+    if terms == [0.0; 3] {
+        return Err(s.error("`attenuation` takes three numbers that are not all 0"));
+    }
+    Ok(terms)
+}
+
+/// The command line says where a picture goes.
+pub(super) fn output(s: &mut Statement, scene: &mut SceneDesc) {
+    let named = s.remainder("a picture").unwrap_or_default();
+    let what = format!("the picture's name, {named}: it is given when rendering");
+    scene.losses.push(Loss { section: "film", place: s.place(), what });
+}
+
+/// `point POSITION(3) COLOR(3)`, with the attenuation that holds, or `directional DIRECTION(3) COLOR(3)`. Both take the
+/// present transform.
+pub(super) fn light(s: &mut Statement, top: DAffine3, attenuation: [f64; 3]) -> Result<Node> {
+    let place = s.place();
+    let (at, color) = (DVec3::from_array(s.vector()?), s.color()?);
+    if s.word == "point" {
+        let params = vec![
+            ("position", numbers(top.transform_point3(at).to_array())),
+            ("intensity", numbers(color)),
+            ("attenuation", numbers(attenuation)),
+        ];
+        return Ok(node("point", &place, params));
+    }
+    // The file says where the light is; ours say where it shines.
+    let direction = -top.transform_vector3(at);
+    if direction.length_squared() == 0.0 {
+        return Err(s.error("`directional` takes a direction that is not zero, then a colour"));
+    }
+    let params = vec![("direction", numbers(direction.to_array())), ("irradiance", numbers(color))];
+    Ok(node("directional", &place, params))
 }
 
 /// How far up from the scene's folder its files are looked for: the programs of these formats were started in a folder
