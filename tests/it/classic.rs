@@ -100,8 +100,8 @@ fn the_sky_lights_by_the_integral_without_pi() {
 fn closed_forms_are_what_sampling_converges_to() {
     let lamp = "[materials.lamp]\ntype = \"emissive\"\nradiance = [5, 4, 3]\n\
                 [[objects]]\nshape = { type = \"quad\", corner = [0.5, 1, -1], edge_a = [2, 0, 0], edge_b = [0, 0.5, 2] }\n\
-                material = \"lamp\"\n[[lights]]\ntype = \"point\"\nposition = [3, 4, 0]\nintensity = 10\n\
-                [[lights]]\ntype = \"directional\"\ndirection = [-1, -2, 0]\nirradiance = 0.5\n";
+                material = \"lamp\"\n[[lights]]\ntype = \"point\"\nposition = [-3, 4, 0]\nintensity = 10\n\
+                [[lights]]\ntype = \"directional\"\ndirection = [1, -2, 0]\nirradiance = 0.5\n";
     for material in
         ["type = \"diffuse\"\nalbedo = [0.5, 0.6, 0.7]", "type = \"phong\"\ndiffuse = 0.7\nspecular = 0"]
     {
@@ -134,7 +134,7 @@ fn lamps_and_physical_materials_take_part() {
 fn a_lamp_that_is_grazed_lights_all_the_same() {
     // A wall that leans a little, close below the lamp's plane: shadow rays start beside the wall and must not meet the
     // lamp before their end.
-    let toml = "[film]\nsize = [9, 9]\n[camera]\ntype = \"perspective\"\neye = [300, 540, 280]\nlook_at = [556, 548.2, 280]\n\
+    let toml = "[film]\nsize = [9, 9]\n[camera]\ntype = \"perspective\"\neye = [300, 540, 280]\nlook_at = [556, 545, 280]\n\
                 fov_deg = 0.2\n[materials.m]\ntype = \"diffuse\"\nalbedo = 0.5\n[materials.lamp]\ntype = \"emissive\"\nradiance = 5e4\n\
                 [[objects]]\nmaterial = \"m\"\nshape = { type = \"quad\", corner = [552.8, 0, 0], edge_a = [3.2, 548.8, 0], \
                 edge_b = [0, 0, 559.2] }\n[[objects]]\nmaterial = \"lamp\"\nshape = { type = \"quad\", corner = [213, 548.8, 227], \

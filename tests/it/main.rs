@@ -4,6 +4,7 @@ mod bad_geometry;
 mod classic;
 mod cli;
 mod common;
+mod convert;
 mod crosscheck;
 mod geometry;
 mod glass;
