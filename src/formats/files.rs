@@ -3,7 +3,7 @@
 use crate::base::image_data::{Encoding, ImageData, Texels};
 use crate::base::mesh_data::{MeshData, Positions, Repairs};
 use crate::error::{Error, Place, Result};
-use crate::formats::{load_mesh, sky_files};
+use crate::formats::{NamedFiles, load_mesh, sky_files};
 use crate::image::read::read_image;
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -14,7 +14,8 @@ use std::sync::{Arc, LazyLock};
 /// [`Files::read_noted`] reads them all, and the text is read again. So errors of the text come before any large file
 /// is opened, and what a file names in turn (a mesh its pictures) is one round more.
 pub(crate) struct Files {
-    folder: PathBuf,
+    /// Relative paths are relative to it; None where no file is to be opened.
+    folder: Option<PathBuf>,
     read: HashMap<Request, Content>,
     noted: Vec<(Request, bool)>,
     number_of: HashMap<Request, usize>,
@@ -55,14 +56,20 @@ fn gray() -> ImageData {
 }
 
 impl Files {
-    /// Relative paths are relative to `folder`.
-    pub fn new(folder: &Path) -> Self {
+    /// Those that the file at `path` names: relative paths are relative to its folder.
+    pub fn of(path: &Path, named: NamedFiles) -> Self {
+        let folder = path.parent().unwrap_or(Path::new(""));
         Files {
-            folder: folder.to_owned(),
+            folder: (named == NamedFiles::Read).then(|| folder.to_owned()),
             read: HashMap::new(),
             noted: Vec::new(),
             number_of: HashMap::new(),
         }
+    }
+
+    /// Whether files are opened; else there are placeholders only.
+    pub fn are_read(&self) -> bool {
+        self.folder.is_some()
     }
 
     /// A picture that `place` names.
@@ -144,6 +151,9 @@ impl Files {
     pub fn read_noted(&mut self) -> Result<bool> {
         self.number_of.clear();
         let noted = std::mem::take(&mut self.noted);
+        if !self.are_read() {
+            return Ok(false);
+        }
         let contents: Vec<Result<Content>> = noted.par_iter().map(|(r, _)| r.read()).collect();
         let any = !noted.is_empty();
         for ((request, required), content) in noted.into_iter().zip(contents) {
@@ -161,17 +171,31 @@ impl Files {
 
     /// The file's one true path, so that two names of it are one file.
     fn resolve(&self, path: &Path, place: &Place) -> Result<PathBuf> {
-        let full = self.folder.join(path);
-        full.canonicalize().map_err(|e| {
+        let Some(folder) = &self.folder else { return Ok(path.to_owned()) };
+        let full = folder.join(path);
+        let at = || if place.line > 0 { format!(" (named at {place})") } else { String::new() };
+        let found = full.canonicalize().map_err(|e| {
             let hint = near_file(&full).map_or(String::new(), |n| format!("; did you mean \"{n}\"?"));
-            let at = if place.line > 0 { format!(" (named at {place})") } else { String::new() };
-            Error::file(&full, "open", format!("{e}{at}{hint}"))
-        })
+            Error::file(&full, "open", format!("{e}{}{hint}", at()))
+        })?;
+        refuse_devices(&found, &at())?;
+        Ok(found)
     }
+}
+
+/// Names stand in files that may come from anywhere, and a device or a pipe may never end.
+fn refuse_devices(path: &Path, at: &str) -> Result<()> {
+    let about = path.metadata().map_err(|e| Error::file(path, "open", e))?;
+    if about.is_file() || about.is_dir() {
+        return Ok(());
+    }
+    Err(Error::file(path, "open", format!("it is neither a file nor a folder{at}")))
 }
 
 impl Request {
     fn read(&self) -> Result<Content> {
+        let (Request::Image(path, _) | Request::Faces(path, _) | Request::Mesh(path)) = self;
+        refuse_devices(path, "")?;
         let encoding = |linear: &bool| linear.then_some(Encoding::Linear);
         Ok(match self {
             Request::Image(path, linear) => Content::Image(Arc::new(read_image(path, encoding(linear))?)),

@@ -4,6 +4,7 @@
 use crate::base::mesh_data::{MeshData, MeshMaterial};
 use crate::base::registry::{Node, Params, Value};
 use crate::error::{Place, Result};
+use crate::formats::NamedFiles;
 use crate::formats::files::Files;
 use crate::scene::desc::{Content, Named, ObjectDesc, SceneDesc, SkyDesc};
 use glam::DAffine3;
@@ -20,7 +21,7 @@ const SKY: &str = "midday";
 /// Those of [`crate::formats::load_mesh`]. A picture of its material library that cannot be read costs a warning.
 pub fn load(path: &Path) -> Result<SceneDesc> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let mut files = Files::new(path.parent().unwrap_or(Path::new("")));
+    let mut files = Files::of(path, NamedFiles::Read);
     let place = Place::default();
     loop {
         let mesh = files.mesh(&name, &place)?;
@@ -113,7 +114,7 @@ mod tests {
             materials,
             repairs: Repairs::default(),
         });
-        let mut files = Files::new(dir.path());
+        let mut files = Files::of(&dir.path().join("a.obj"), NamedFiles::Read);
         let mut scene = SceneDesc::default();
         material_library("m.obj", &mesh, &mut files, &mut scene).unwrap();
         assert!(files.read_noted().unwrap(), "the picture was asked for, and is no error");

@@ -90,6 +90,17 @@ pub enum Compat {
     Physical,
 }
 
+/// What becomes of the files that a scene file names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum NamedFiles {
+    /// They are read.
+    #[default]
+    Read,
+    /// None is looked for, and what a file holds is left empty: a mesh without a triangle, a gray picture, no sky. For
+    /// looking at a text alone.
+    LeftOut,
+}
+
 /// How scene files are read.
 #[derive(Debug, Clone)]
 pub struct LoadOptions {
@@ -98,11 +109,17 @@ pub struct LoadOptions {
     pub families: Families,
     /// For files of other programs.
     pub compat: Compat,
+    /// What becomes of the files that a scene file names.
+    pub named_files: NamedFiles,
 }
 
 impl Default for LoadOptions {
     fn default() -> Self {
-        LoadOptions { families: Families::registered(), compat: Compat::default() }
+        LoadOptions {
+            families: Families::registered(),
+            compat: Compat::default(),
+            named_files: NamedFiles::default(),
+        }
     }
 }
 
@@ -146,6 +163,22 @@ pub fn load_with(path: &Path, options: &LoadOptions) -> Result<SceneDesc> {
     let bytes = source::read(path)?;
     match kind_of(path, &bytes, named)? {
         Kind::Mesh(_) => mesh_scene::load(path),
+        Kind::Scene(format) => (format.parse)(&SceneText { path, bytes: &bytes }, options),
+    }
+}
+
+/// As [`load_with`], from the bytes of a scene file, which may be packed; `path` is for messages, for the extension and
+/// for the folder of the files that the scene names.
+///
+/// # Errors
+/// [`Error::Content`] if what stands in it cannot be used, or is a mesh ([`parse_mesh`] reads those); [`Error::File`]
+/// for files that it names.
+pub fn parse(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<SceneDesc> {
+    let extension = source::content_extension(path);
+    let named = SCENE_FORMATS.iter().find(|f| Some(f.extension) == extension.as_deref());
+    let bytes = source::unpacked(path, &bytes)?;
+    match kind_of(path, &bytes, named)? {
+        Kind::Mesh(_) => Err(Error::content(path, "holds a mesh, where a scene is wanted")),
         Kind::Scene(format) => (format.parse)(&SceneText { path, bytes: &bytes }, options),
     }
 }
@@ -206,25 +239,42 @@ pub fn is_mesh_path(path: &Path) -> bool {
 /// [`Error::File`] if the file cannot be read; [`Error::Content`] if the extension is unknown, the content is damaged
 /// or there is no surface in it.
 pub fn load_mesh(path: &Path) -> Result<MeshData> {
-    let extension = source::content_extension(path);
-    let named = MESH_FORMATS.iter().find(|format| Some(format.extension) == extension.as_deref());
-    let unknown = || {
-        let what =
-            unknown_name("kind of mesh file", &extension.clone().unwrap_or_default(), mesh_extensions());
-        Error::content(path, format!("{what} (each also packed as .gz or .zst)"))
-    };
-    if named.is_none() && !path.exists() {
-        return Err(unknown());
+    let format = named_mesh_format(path);
+    if format.is_none() && !path.exists() {
+        return Err(unknown_mesh(path));
     }
+    read_mesh(path, Source::open(path)?, format)
+}
+
+/// As [`load_mesh`], from the bytes of a file; `path` is for messages, for the extension and for the folder of its
+/// material libraries.
+///
+/// # Errors
+/// As [`load_mesh`].
+pub fn parse_mesh(path: &Path, bytes: &[u8]) -> Result<MeshData> {
+    read_mesh(path, Source::of_file_bytes(path, bytes)?, named_mesh_format(path))
+}
+
+fn named_mesh_format(path: &Path) -> Option<&'static MeshFormat> {
+    let extension = source::content_extension(path);
+    MESH_FORMATS.iter().find(|format| Some(format.extension) == extension.as_deref())
+}
+
+fn unknown_mesh(path: &Path) -> Error {
+    let extension = source::content_extension(path).unwrap_or_default();
+    let what = unknown_name("kind of mesh file", &extension, mesh_extensions());
+    Error::content(path, format!("{what} (each also packed as .gz or .zst)"))
+}
+
+fn read_mesh(path: &Path, mut source: Source, named: Option<&MeshFormat>) -> Result<MeshData> {
     let format = match named {
         Some(format) => format,
         None => {
-            let mut head = Vec::new();
-            Source::open(path)?.fill(&mut head, HEAD)?;
-            MESH_FORMATS.iter().find(|f| (f.recognise)(&head)).ok_or_else(unknown)?
+            let head = source.head(HEAD)?;
+            MESH_FORMATS.iter().find(|f| (f.recognise)(&head)).ok_or_else(|| unknown_mesh(path))?
         }
     };
-    let mesh = (format.read)(path, Source::open(path)?)?;
+    let mesh = (format.read)(path, source)?;
     if let Some(repairs) = mesh.repairs.describe() {
         log::warn!("{}: {repairs}", path.display());
     }

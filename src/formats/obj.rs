@@ -43,20 +43,28 @@ pub fn parse(path: &Path, bytes: &[u8]) -> Result<MeshData> {
     read(path, Source::of_bytes(path, bytes))
 }
 
+/// As [`parse`], with a material library from memory for all that the file names, whatever their names.
+///
+/// # Errors
+/// As [`parse`].
+pub fn parse_with_library(path: &Path, bytes: &[u8], library: &[u8]) -> Result<MeshData> {
+    read_blocks(path, Blocks::new(Source::of_bytes(path, bytes)), Some(library))
+}
+
 /// As [`parse`], from a file.
 ///
 /// # Errors
 /// As [`parse`], and those of reading.
 pub fn read(path: &Path, source: Source) -> Result<MeshData> {
-    read_blocks(path, Blocks::new(source))
+    read_blocks(path, Blocks::new(source), None)
 }
 
-fn read_blocks(path: &Path, blocks: Blocks) -> Result<MeshData> {
+fn read_blocks(path: &Path, blocks: Blocks, library: Option<&[u8]>) -> Result<MeshData> {
     let tables = Tables::read(path, blocks)?;
     if tables.arities.faces == 0 {
         return Err(Error::content(path, no_surface(&tables)));
     }
-    Ok(assemble(path, tables))
+    Ok(assemble(path, tables, library))
 }
 
 fn no_surface(tables: &Tables) -> String {
@@ -70,7 +78,7 @@ fn no_surface(tables: &Tables) -> String {
 }
 
 /// Makes the mesh of what stands in the file, giving up each table when its part is made.
-fn assemble(path: &Path, tables: Tables) -> MeshData {
+fn assemble(path: &Path, tables: Tables, library: Option<&[u8]>) -> MeshData {
     let Tables { positions, uvs, normals, mut corners, arities, materials, libraries, mut repairs, .. } =
         tables;
     let count = corners.len();
@@ -104,7 +112,7 @@ fn assemble(path: &Path, tables: Tables) -> MeshData {
         uvs,
         indices,
         material_ids,
-        materials: MaterialTable::load(path, &libraries, names).materials,
+        materials: MaterialTable::load(path, &libraries, library, names).materials,
         repairs,
     };
     if mesh.materials.len() <= 1 {

@@ -64,7 +64,7 @@ const WORDS: &[&str] = &[
 
 fn parse(file: &SceneText, options: &LoadOptions) -> Result<SceneDesc> {
     let text = file.text()?;
-    let mut files = Files::new(file.path.parent().unwrap_or(Path::new("")));
+    let mut files = Files::of(file.path, options.named_files);
     loop {
         let mut reader = Reader::new(file.path, options.compat, &mut files);
         for_each(file.path, text, |s| reader.statement(s))?;
@@ -73,7 +73,7 @@ fn parse(file: &SceneText, options: &LoadOptions) -> Result<SceneDesc> {
         if files.read_noted()? {
             continue;
         }
-        if let Some(path) = sky {
+        if let Some(path) = sky.filter(|_| files.are_read()) {
             scene.sky = Some(SkyDesc::new(load_sky(&path, Some(Encoding::Linear))?));
         }
         return Ok(scene);
@@ -188,7 +188,7 @@ impl<'a> Reader<'a> {
     fn obj(&mut self, s: &mut Statement) -> Result<()> {
         let named = s.remainder("the path of an OBJ file")?;
         let place = s.place();
-        let path = locate(self.path, named, s)?;
+        let path = self.locate(named, &place)?;
         let mesh = self.files.mesh_at(&path, &place)?;
         self.place(mesh_node(&place, Value::Mesh(mesh)), self.stack.top())
     }
@@ -204,8 +204,12 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
+    fn locate(&self, named: &str, place: &Place) -> Result<PathBuf> {
+        if self.files.are_read() { locate(self.path, named, place) } else { Ok(PathBuf::from(named)) }
+    }
+
     fn texture(&mut self, named: &str, place: &Place) -> Result<Value> {
-        let path = super::commands::locate_at(self.path, named, place)?;
+        let path = self.locate(named, place)?;
         let image = self.files.image_at(&path, Some(Encoding::Linear), place)?;
         let params = vec![("path", Value::Image(image)), ("filter", Value::Text("nearest".into()))];
         Ok(Value::Node(Box::new(node("image", place, params))))
@@ -222,7 +226,7 @@ impl<'a> Reader<'a> {
             },
             None => (text, 1.0),
         };
-        self.sky = Some(locate(self.path, named, s)?);
+        self.sky = Some(self.locate(named, &s.place())?);
         self.sky_light = intensity;
         if intensity != 1.0 {
             let what =

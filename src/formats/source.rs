@@ -37,27 +37,47 @@ impl<'a> Source<'a> {
     /// its name says so.
     pub fn open(path: &'a Path) -> Result<Self> {
         let fail = |e: std::io::Error| Error::file(path, "read", e);
-        let mut file = std::fs::File::open(path).map_err(|e| Error::file(path, "open", e))?;
+        let file = std::fs::File::open(path).map_err(|e| Error::file(path, "open", e))?;
         let meta = file.metadata().map_err(fail)?;
         if meta.is_dir() {
             return Err(Error::file(path, "read", "it is a folder"));
         }
+        let size = meta.is_file().then_some(meta.len());
+        Source::of_stream(path, file, meta.len(), size)
+    }
+
+    /// Of the bytes of a file, packed or not; `path` is for messages and for the extension.
+    ///
+    /// # Errors
+    /// As [`Source::open`], but for those of opening and reading.
+    pub fn of_file_bytes(path: &'a Path, bytes: &'a [u8]) -> Result<Self> {
+        let size = bytes.len() as u64;
+        Source::of_stream(path, bytes, size, Some(size))
+    }
+
+    fn of_stream(
+        path: &'a Path,
+        mut file: impl Read + Send + 'a,
+        length: u64,
+        size: Option<u64>,
+    ) -> Result<Self> {
+        let fail = |e: std::io::Error| Error::file(path, "read", e);
         let mut head = Vec::new();
         (&mut file).take(ZSTD_MAGIC.len() as u64).read_to_end(&mut head).map_err(fail)?;
-        let limit = FREE_EXPANSION.max(meta.len().saturating_mul(MAX_RATIO));
+        let limit = FREE_EXPANSION.max(length.saturating_mul(MAX_RATIO));
         let (is_gzip, is_zstd) = (head.starts_with(GZIP_MAGIC), head.starts_with(ZSTD_MAGIC));
         if !is_gzip && !is_zstd {
             refuse_misnamed(path, &head)?;
         }
         let whole = Cursor::new(head).chain(file);
-        let (stream, packing): (Box<dyn Read + Send>, _) = if is_gzip {
+        let (stream, packing): (Box<dyn Read + Send + 'a>, _) = if is_gzip {
             (Box::new(flate2::bufread::MultiGzDecoder::new(BufReader::new(whole))), Some("gzip"))
         } else if is_zstd {
             (Box::new(ZstdFrames::new(BufReader::new(whole))), Some("Zstandard"))
         } else {
             (Box::new(whole), None)
         };
-        let size = (meta.is_file() && packing.is_none()).then_some(meta.len());
+        let size = size.filter(|_| packing.is_none());
         Ok(Source { path, stream, packing, left: limit, limit, size })
     }
 
@@ -84,6 +104,19 @@ impl<'a> Source<'a> {
             self.left = self.left.checked_sub(read as u64).ok_or_else(|| self.too_large(packing))?;
         }
         Ok(read)
+    }
+
+    /// The first `count` bytes (or all, if there are fewer), which stay to be read.
+    ///
+    /// # Errors
+    /// Those of [`Source::fill`].
+    pub fn head(&mut self, count: usize) -> Result<Vec<u8>> {
+        let mut head = Vec::new();
+        self.fill(&mut head, count)?;
+        self.left = self.left.saturating_add(head.len() as u64);
+        let rest = std::mem::replace(&mut self.stream, Box::new(std::io::empty()));
+        self.stream = Box::new(Cursor::new(head.clone()).chain(rest));
+        Ok(head)
     }
 
     /// Bytes in all, where that is known before they are read: not of packed data, nor of a pipe.
@@ -141,6 +174,14 @@ impl<'a> Source<'a> {
 /// Those of [`Source::open`] and [`Source::read_all`].
 pub fn read(path: &Path) -> Result<Vec<u8>> {
     Source::open(path)?.read_all()
+}
+
+/// As [`read`], of the bytes of a file; `path` is for messages and for the extension.
+///
+/// # Errors
+/// As [`read`], but for those of opening and reading.
+pub fn unpacked(path: &Path, bytes: &[u8]) -> Result<Vec<u8>> {
+    Source::of_file_bytes(path, bytes)?.read_all()
 }
 
 /// The extension that tells what is in the file, in lower case, with `.gz` or `.zst` stripped: `ply` for

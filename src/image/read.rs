@@ -60,10 +60,18 @@ pub fn decode_image(path: &Path, bytes: &[u8], encoding: Option<Encoding>) -> Re
 /// As [`read_image`].
 pub fn read_planes(path: &Path) -> Result<Picture> {
     let bytes = std::fs::read(path).map_err(|e| Error::file(path, "open", e))?;
-    if sniff(path, &bytes)? == Format::Exr {
-        return exr_read::decode_planes(path, &bytes);
+    decode_planes(path, &bytes)
+}
+
+/// As [`read_planes`], from the bytes of a file; `path` is for messages alone.
+///
+/// # Errors
+/// As [`read_image`].
+pub fn decode_planes(path: &Path, bytes: &[u8]) -> Result<Picture> {
+    if sniff(path, bytes)? == Format::Exr {
+        return exr_read::decode_planes(path, bytes);
     }
-    let image = decode_image(path, &bytes, None)?;
+    let image = decode_image(path, bytes, None)?;
     let mut picture = Picture::new(image.width, image.height);
     let texels: Vec<_> = (0..image.height)
         .flat_map(|y| (0..image.width).map(move |x| (x, y)))

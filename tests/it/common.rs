@@ -91,3 +91,21 @@ pub fn assert_mean(what: &str, m: &Mean, expected: f64, sigmas: f64, systematic:
         m.error
     );
 }
+
+/// A folder of the shared data; None, said on the way, where that is absent.
+pub fn shared(folder: &str) -> Option<std::path::PathBuf> {
+    let data = std::env::var_os("SKYLIT_DATA").map_or_else(
+        || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
+        std::path::PathBuf::from,
+    );
+    if data.is_dir() {
+        return Some(data.join(folder));
+    }
+    assert!(
+        std::env::var_os("SKYLIT_REQUIRE_DATA").is_none_or(|v| v != "1"),
+        "{} is no folder",
+        data.display()
+    );
+    println!("skipped: no SKYLIT_DATA");
+    None
+}

@@ -1,10 +1,12 @@
 //! The one integration-test binary: a module a subject.
 
 mod bad_geometry;
+mod bad_scenes;
 mod classic;
 mod cli;
 mod common;
 mod convert;
+mod corpus;
 mod crosscheck;
 mod geometry;
 mod glass;
@@ -14,4 +16,5 @@ mod light;
 mod matches;
 mod open_house;
 mod reference;
+mod seeds;
 mod source;

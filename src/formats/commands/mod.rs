@@ -110,18 +110,14 @@ pub(super) fn light(s: &mut Statement, top: DAffine3, attenuation: [f64; 3]) -> 
 /// above it.
 const FOLDERS_UP: usize = 3;
 
-/// The file or folder that a statement names: relative to the scene's folder, or to one above it.
-pub(super) fn locate(scene: &Path, named: &str, s: &Statement) -> Result<PathBuf> {
-    locate_at(scene, named, &s.place())
-}
-
-/// As [`locate`], for a name given at `place`.
-pub(super) fn locate_at(scene: &Path, named: &str, place: &Place) -> Result<PathBuf> {
+/// The file or folder that a statement at `place` names: relative to the scene's folder, or to one above it.
+pub(super) fn locate(scene: &Path, named: &str, place: &Place) -> Result<PathBuf> {
     let folder = scene.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut tried = folder.to_owned();
     for _ in 0..=FOLDERS_UP {
         let path = tried.join(named);
-        if path.exists() {
+        // A device or a pipe may never end.
+        if path.is_file() || path.is_dir() {
             return Ok(path);
         }
         tried.push("..");

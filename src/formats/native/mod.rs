@@ -15,7 +15,7 @@ use crate::color::Transfer;
 use crate::error::{Error, Result};
 use crate::formats::families::{Families, Kind};
 use crate::formats::files::Files;
-use crate::formats::{LoadOptions, SceneFormat, SceneText};
+use crate::formats::{LoadOptions, NamedFiles, SceneFormat, SceneText};
 use crate::scene::desc::{Background, Named, ObjectDesc, RenderDesc, SceneDesc, SkyDesc};
 use nodes::NodeTable;
 use std::path::Path;
@@ -53,14 +53,14 @@ fn load(file: &SceneText, options: &LoadOptions) -> Result<SceneDesc> {
         let message = format!("{length} bytes of scene text; {MAX_BYTES} are the most that is read");
         return Err(Error::content(file.path, message));
     }
-    parse(file.path, file.text()?, &options.families)
+    parse(file.path, file.text()?, &options.families, options.named_files)
 }
 
 /// Reads the text of a scene file; `path` is for messages and for the paths in it, which are relative to its folder.
-pub(crate) fn parse(path: &Path, text: &str, families: &Families) -> Result<SceneDesc> {
+pub(crate) fn parse(path: &Path, text: &str, families: &Families, named: NamedFiles) -> Result<SceneDesc> {
     let source = Source::new(path, text);
     let root = source.parse()?;
-    let mut files = Files::new(path.parent().unwrap_or(Path::new("")));
+    let mut files = Files::of(path, named);
     loop {
         let mut reader = Reader { source: &source, families, files: &mut files, scene: SceneDesc::default() };
         reader.read(&root)?;

@@ -58,7 +58,7 @@ fn families() -> Families {
 }
 
 fn read(text: &str) -> Result<SceneDesc> {
-    parse(Path::new("scene.toml"), text, &families())
+    parse(Path::new("scene.toml"), text, &families(), NamedFiles::Read)
 }
 
 fn error(text: &str) -> String {
@@ -276,7 +276,7 @@ fn one_file_is_one_mesh_however_it_is_named() {
     let text = "[materials.a]\ntype = 'diffuse'\n\
                 [[objects]]\nshape = { type = 'mesh', path = 'tri.ply' }\n\
                 [[objects]]\nshape = { type = 'mesh', path = 'sub/../tri.ply', smooth = false }\n";
-    let scene = parse(&scene_file, text, &families()).unwrap();
+    let scene = parse(&scene_file, text, &families(), NamedFiles::Read).unwrap();
     let meshes: Vec<_> = scene
         .objects
         .iter()
@@ -287,10 +287,13 @@ fn one_file_is_one_mesh_however_it_is_named() {
         .collect();
     assert_eq!(meshes[0].indices.len(), 1);
     assert!(std::sync::Arc::ptr_eq(&meshes[0], &meshes[1]));
-    let e = parse(&scene_file, &text.replace("tri.ply", "trj.ply"), &families()).err().unwrap();
+    let e =
+        parse(&scene_file, &text.replace("tri.ply", "trj.ply"), &families(), NamedFiles::Read).err().unwrap();
     assert_eq!(e.exit_code(), 3);
     assert!(e.to_string().contains("did you mean \"tri.ply\"?"), "{e}");
-    let e = parse(&scene_file, &format!("{text}materials = ['a', 'a']"), &families()).err().unwrap();
+    let e = parse(&scene_file, &format!("{text}materials = ['a', 'a']"), &families(), NamedFiles::Read)
+        .err()
+        .unwrap();
     assert!(e.to_string().contains("7:13: `materials` names 2, but the mesh has 1"), "{e}");
 }
 
@@ -301,7 +304,7 @@ fn textures_and_their_encoding_reach_the_reader() {
     picture.save(dir.path().join("gray.png")).unwrap();
     let value = |table: &str| {
         let text = format!("[materials.a]\ntype = 'diffuse'\nalbedo = {table}");
-        let scene = parse(&dir.path().join("s.toml"), &text, &families()).unwrap();
+        let scene = parse(&dir.path().join("s.toml"), &text, &families(), NamedFiles::Read).unwrap();
         match scene.materials[0].value.params.get("albedo") {
             Some(Value::Node(n)) => n.params.image("path").unwrap().texel(1, 1).r,
             _ => panic!("a texture is a node"),

@@ -14,11 +14,16 @@ pub struct MaterialTable {
 
 impl MaterialTable {
     /// Looks up `names` in the `libraries` that the OBJ file at `path` names. What cannot be read or found is logged
-    /// as a warning, and its material has a name only.
-    pub fn load(path: &Path, libraries: &[String], names: &[String]) -> Self {
+    /// as a warning, and its material has a name only. A library that is `given` stands for all of them.
+    pub fn load(path: &Path, libraries: &[String], given: Option<&[u8]>, names: &[String]) -> Self {
         let folder = path.parent().unwrap_or(Path::new(""));
-        let files = libraries.iter().flat_map(|name| library_files(folder, name));
-        let known: Vec<MeshMaterial> = files.flat_map(|file| read_library(path, &file)).collect();
+        let known: Vec<MeshMaterial> = match given {
+            Some(bytes) => libraries.iter().take(1).flat_map(|_| parse(path, bytes)).collect(),
+            None => {
+                let files = libraries.iter().flat_map(|name| library_files(folder, name));
+                files.flat_map(|file| read_library(path, &file)).collect()
+            }
+        };
         let missing: Vec<&str> =
             names.iter().filter(|n| !n.is_empty() && find(&known, n).is_none()).map(String::as_str).collect();
         if let [first, ..] = missing[..] {

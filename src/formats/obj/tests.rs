@@ -217,7 +217,7 @@ fn no_cut_and_no_changed_byte_panics() {
 fn read_in_blocks(text: &[u8], size: usize, threads: usize) -> Result<MeshData> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let path = Path::new("a.obj");
-    pool.install(|| read_blocks(path, Blocks::of_size(Source::of_bytes(path, text), size)))
+    pool.install(|| read_blocks(path, Blocks::of_size(Source::of_bytes(path, text), size), None))
 }
 
 #[test]

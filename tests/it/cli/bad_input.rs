@@ -1,6 +1,7 @@
 //! One clear error with the right exit code, or a counted repair, for everything that can be wrong.
 
 use super::folder::{Folder, QUICK, SCENE};
+use crate::common::shared;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -187,21 +188,6 @@ fn truncated_files_never_crash_and_leave_nothing() {
             assert_eq!(f.listing(), before, "{command}");
         }
     }
-}
-
-fn shared(folder: &str) -> Option<PathBuf> {
-    let data = std::env::var_os("SKYLIT_DATA")
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
-    if data.is_dir() {
-        return Some(data.join(folder));
-    }
-    assert!(
-        std::env::var_os("SKYLIT_REQUIRE_DATA").is_none_or(|v| v != "1"),
-        "{} is no folder",
-        data.display()
-    );
-    println!("skipped: no SKYLIT_DATA");
-    None
 }
 
 /// The OBJ and PLY files of a folder of shared meshes, and of those within it.
