@@ -1,5 +1,6 @@
 //! The one error type, sorted by what the user can do about it (and so by exit code).
 
+use std::borrow::Cow;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
@@ -10,7 +11,7 @@ pub enum Error {
     #[error("{0}")]
     Usage(String),
     /// A file was read, but what stands in it cannot be used. Exit code 2.
-    #[error("{}{message}", place.prefix())]
+    #[error("{}{}", place.prefix(), clipped(message))]
     Content {
         /// Where it stands.
         place: Place,
@@ -96,6 +97,21 @@ impl Error {
     }
 }
 
+/// Most characters of a message about content: it may quote a file's line, and that may be a megabyte long.
+const MAX_MESSAGE: usize = 1000;
+
+/// The message, or its beginning and its end.
+fn clipped(message: &str) -> Cow<'_, str> {
+    let count = message.chars().count();
+    if count <= MAX_MESSAGE {
+        return Cow::Borrowed(message);
+    }
+    let (head, tail) = (MAX_MESSAGE / 2, count - MAX_MESSAGE / 2);
+    let text: String =
+        message.chars().take(head).chain(" [...] ".chars()).chain(message.chars().skip(tail)).collect();
+    Cow::Owned(text)
+}
+
 /// Most known names that a message lists.
 const MAX_LISTED: usize = 32;
 
@@ -139,6 +155,14 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_message_about_a_line_of_a_megabyte_is_short() {
+        let line = "\u{fffd}".repeat(1 << 20);
+        let text = Error::content_at(Path::new("a"), 3, 0, format!("\"{line}\" is no corner")).to_string();
+        assert!(text.starts_with("a:3: \"\u{fffd}") && text.ends_with("\" is no corner"), "{text}");
+        assert!(text.chars().count() < MAX_MESSAGE + 20);
+    }
 
     #[test]
     fn hints_name_the_nearest_and_list_the_rest() {

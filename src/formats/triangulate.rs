@@ -2,9 +2,12 @@
 
 use glam::{DVec2, DVec3};
 
-/// Steps (point-in-triangle tests and the like) after which a polygon is cut no further by ears but by a fan: ear clipping is quadratic,
-/// and a damaged file may hold one polygon of a million corners.
+/// Steps (point-in-triangle tests and the like) after which polygons are cut no further by ears but by a fan: ear
+/// clipping is quadratic, and a damaged file may hold one polygon of a million corners.
 const MAX_STEPS: u64 = 1 << 28;
+/// Steps that each corner adds to those. Polygons of so many corners pay for themselves, however many there are; a file
+/// of thousands that are larger, and have no ears, takes a time that grows with its length and no faster.
+const STEPS_PER_CORNER: u64 = 1 << 11;
 
 /// Cuts one polygon after another; holds the scratch memory.
 #[derive(Default)]
@@ -16,6 +19,9 @@ pub struct Triangulator {
     prev: Vec<usize>,
     /// Corners that may lie inside another corner's triangle.
     reflex: Vec<usize>,
+    /// Steps that the corners of all polygons so far added, and those that were taken.
+    earned: u64,
+    taken: u64,
 }
 
 impl Triangulator {
@@ -81,12 +87,14 @@ impl Triangulator {
         self.next = (0..n).map(|i| (i + 1) % n).collect();
         self.prev = (0..n).map(|i| (i + n - 1) % n).collect();
         self.reflex = (0..n).filter(|&i| !self.turns_left(i)).collect();
+        self.earned += STEPS_PER_CORNER * n as u64;
+        let most = (MAX_STEPS + self.earned).saturating_sub(self.taken);
         let mut steps = 0;
         let mut left = n;
         let mut at = 0;
         let mut refused = 0;
         let mut second_best = None;
-        while left > 3 && steps < MAX_STEPS {
+        while left > 3 && steps < most {
             if self.is_ear(at, &mut steps) || refused >= left {
                 let ear = if refused >= left { second_best.unwrap_or(at) } else { at };
                 out.push([corners[self.prev[ear]], corners[ear], corners[self.next[ear]]]);
@@ -103,6 +111,7 @@ impl Triangulator {
                 at = self.next[at];
             }
         }
+        self.taken += steps;
         let rest: Vec<u32> =
             std::iter::successors(Some(at), |&i| Some(self.next[i])).take(left).map(|i| corners[i]).collect();
         fan(&rest, out);

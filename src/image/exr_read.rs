@@ -61,7 +61,10 @@ impl Picture {
     fn set_frame_from(&mut self, header: &Header) {
         let display = header.shared_attributes.display_window;
         let position = header.own_attributes.layer_position;
-        let offset = [position.x() - display.position.x(), position.y() - display.position.y()];
+        // Windows may lie at both ends of the range.
+        let apart = |a: i32, b: i32| i64::from(a) - i64::from(b);
+        let from = display.position;
+        let offset = [apart(position.x(), from.x()), apart(position.y(), from.y())];
         let size = [self.width, self.height];
         for axis in 0..2 {
             // A data window that reaches over the display window keeps its pixels and becomes the frame.

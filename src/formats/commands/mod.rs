@@ -115,9 +115,10 @@ pub(super) fn locate(scene: &Path, named: &str, place: &Place) -> Result<PathBuf
     let folder = scene.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut tried = folder.to_owned();
     for _ in 0..=FOLDERS_UP {
-        let path = tried.join(named);
-        // A device or a pipe may never end.
-        if path.is_file() || path.is_dir() {
+        // In full: whoever opens it may have another idea of where names start from. A device or a pipe may never end.
+        if let Ok(path) = tried.join(named).canonicalize()
+            && (path.is_file() || path.is_dir())
+        {
             return Ok(path);
         }
         tried.push("..");

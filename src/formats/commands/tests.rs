@@ -225,6 +225,9 @@ fn files_are_found_from_the_folder_that_the_program_ran_in() {
     write("objects/my tri.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     let scene = write("scenes/deep/a.scene", "OBJ objects/my tri.obj\n");
     assert_eq!(mesh(&crate::formats::load(&scene).unwrap(), 0).indices.len(), 1);
+    // Also of a scene that is named from here: tests run in the crate's folder.
+    let here = super::locate(Path::new("scenes/any.scene"), "Cargo.toml", &Default::default()).unwrap();
+    assert!(here.is_absolute() && here.ends_with("Cargo.toml"), "{}", here.display());
 }
 
 #[test]

@@ -4,6 +4,7 @@
 
 use crate::base::mesh_data::MeshMaterial;
 use crate::formats::source;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 /// The materials that the faces of a file use.
@@ -20,28 +21,32 @@ impl MaterialTable {
         let known: Vec<MeshMaterial> = match given {
             Some(bytes) => libraries.iter().take(1).flat_map(|_| parse(path, bytes)).collect(),
             None => {
-                let files = libraries.iter().flat_map(|name| library_files(folder, name));
-                files.flat_map(|file| read_library(path, &file)).collect()
+                // Each file once, however often and by however many names it is asked for.
+                let mut seen = HashSet::new();
+                let mut files: Vec<PathBuf> =
+                    libraries.iter().flat_map(|name| library_files(folder, name)).collect();
+                files.retain(|file| seen.insert(file.canonicalize().unwrap_or_else(|_| file.clone())));
+                files.iter().flat_map(|file| read_library(path, file)).collect()
             }
         };
+        // By name, as both may be tens of thousands; of two alike the first counts.
+        let mut by_name: HashMap<&str, &MeshMaterial> = HashMap::with_capacity(known.len());
+        for material in &known {
+            by_name.entry(&material.name).or_insert(material);
+        }
+        let find = |name: &str| by_name.get(name).copied();
         let missing: Vec<&str> =
-            names.iter().filter(|n| !n.is_empty() && find(&known, n).is_none()).map(String::as_str).collect();
+            names.iter().map(String::as_str).filter(|n| !n.is_empty() && find(n).is_none()).collect();
         if let [first, ..] = missing[..] {
             let others =
                 if missing.len() > 1 { format!(" and {} others", missing.len() - 1) } else { String::new() };
             log::warn!("{}: no library defines the material \"{first}\"{others}", path.display());
         }
         let look_up = |name: &String| {
-            find(&known, name)
-                .cloned()
-                .unwrap_or(MeshMaterial { name: name.clone(), ..MeshMaterial::default() })
+            find(name).cloned().unwrap_or(MeshMaterial { name: name.clone(), ..MeshMaterial::default() })
         };
         MaterialTable { materials: names.iter().map(look_up).collect() }
     }
-}
-
-fn find<'a>(known: &'a [MeshMaterial], name: &str) -> Option<&'a MeshMaterial> {
-    known.iter().find(|m| m.name == name)
 }
 
 /// The files that a `mtllib` statement means: one whose name may hold blanks, or several.
@@ -208,5 +213,24 @@ mod tests {
             material("d", None, None),
         ];
         assert_eq!(materials, want);
+    }
+
+    #[test]
+    fn a_library_is_read_once_however_often_it_is_named() {
+        let dir = tempfile::tempdir().unwrap();
+        // Read a hundred thousand times, it would be 6 GB of materials.
+        let library: String = (0..4000).map(|i| format!("newmtl m{i}\nKd 0.5\n")).collect();
+        std::fs::write(dir.path().join("a.mtl"), library).unwrap();
+        let names =
+            [&["a.mtl".to_string(), "./a.mtl".to_string(), "a.mtl a.mtl".to_string()][..]; 33_333].concat();
+        let wanted: Vec<String> = (0..4000).rev().map(|i| format!("m{i}")).collect();
+        let table = MaterialTable::load(&dir.path().join("a.obj"), &names, None, &wanted);
+        assert!(
+            table
+                .materials
+                .iter()
+                .zip(&wanted)
+                .all(|(m, name)| m.name == *name && m.diffuse == Some([0.5; 3]))
+        );
     }
 }
