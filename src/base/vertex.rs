@@ -126,7 +126,8 @@ impl Vertex {
         // and meet a lamp that it grazes before its end.
         let to = self.p.as_dvec3() + w.as_dvec3() * f64::from(dist) - o.as_dvec3();
         let length = to.length();
-        if !(length > 0.0) {
+        // At the lamp's own point there is no direction to it.
+        if length == 0.0 || length.is_nan() {
             return Ray { o, d: w, tnear: 0.0, tfar: 0.0, key };
         }
         // A relative 1e-5 is 80 roundings: more than the error of any sampled point at that distance, and too

@@ -219,6 +219,10 @@ fn check_chunk(chunk: &Chunk, header: &Header) -> std::result::Result<(), &'stat
         CompressedBlock::Tile(block) => &block.compressed_pixels_le,
         _ => return Err("deep data"),
     };
+    // What packing would not make smaller stands as it is, and has no counters.
+    if data.len() as u64 == unpacked_size(chunk, header) {
+        return Ok(());
+    }
     let size = header.max_block_pixel_size();
     // Whole 8 x 8 blocks of every channel, and four times that for run lengths that do not pay.
     let samples = (size.x() + 8) * (size.y() + 8) * header.channels.list.len();
@@ -228,6 +232,29 @@ fn check_chunk(chunk: &Chunk, header: &Header) -> std::result::Result<(), &'stat
         |i: usize| data.get(8 * i..8 * i + 8).and_then(|b| b.try_into().ok()).map(u64::from_le_bytes);
     let sound = [1, 6, 7, 8, 9].into_iter().all(|i| counter(i).is_none_or(|n| n <= most));
     if sound { Ok(()) } else { Err("a chunk claims more than its pixels") }
+}
+
+/// Bytes of a chunk's pixels at the finest level; those at the borders of the picture have fewer.
+fn unpacked_size(chunk: &Chunk, header: &Header) -> u64 {
+    let (whole, picture) = (header.max_block_pixel_size(), header.layer_size);
+    // Where the block begins, from the picture's first pixel; a damaged file may say anything.
+    let begin = match &chunk.compressed_block {
+        CompressedBlock::ScanLine(block) => {
+            let first = header.own_attributes.layer_position.y();
+            [0, i64::from(block.y_coordinate) - i64::from(first)]
+        }
+        CompressedBlock::Tile(block) => {
+            let at = |index: usize, size: usize| index.checked_mul(size).map_or(-1, |n| n as i64);
+            [at(block.coordinates.tile_index.x(), whole.x()), at(block.coordinates.tile_index.y(), whole.y())]
+        }
+        _ => return 0,
+    };
+    let side = |begin: i64, whole: usize, picture: usize| match u64::try_from(begin) {
+        Ok(begin) => (whole as u64).min((picture as u64).saturating_sub(begin)),
+        Err(_) => 0,
+    };
+    let pixels = side(begin[0], whole.x(), picture.x()) * side(begin[1], whole.y(), picture.y());
+    pixels.saturating_mul(header.channels.bytes_per_pixel as u64)
 }
 
 /// Native-endian samples to floats.

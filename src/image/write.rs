@@ -164,7 +164,10 @@ fn write_exr(path: &Path, out: &mut File, picture: &Picture) -> io::Result<()> {
 fn encoder(transfer: Transfer) -> impl Fn(f32) -> u8 {
     move |v| match transfer {
         Transfer::Srgb => srgb8::encode(v),
-        Transfer::Gamma(gamma) => (v.max(0.0).min(1.0).powf(1.0 / gamma) * 255.0).round() as u8,
+        Transfer::Gamma(gamma) => {
+            // A cast from NaN gives 0.
+            (v.clamp(0.0, 1.0).powf(1.0 / gamma) * 255.0).round() as u8
+        }
     }
 }
 

@@ -221,7 +221,7 @@ mod tests {
                 // F is 1 where n is 0.
                 f64::from(4.0 * f * h.z)
             };
-            let alpha2 = f64::from(roughness).powi(4);
+            let alpha2 = roughness.powi(4);
             // In closed form: the share with tan^2 < 1.
             let expected = 1.0 - (-1.0 / alpha2).exp();
             let total = integrate_sphere(area, 1e-5);

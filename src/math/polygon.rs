@@ -59,7 +59,7 @@ mod tests {
         for h in [0.01, 0.5, 1.0, 3.0, 1e4] {
             // Form factor of a square of side 2 from a point below its centre: four quarters of a b x b corner one,
             // F = 2 / pi * b / sqrt(b^2 + h^2) atan(b / sqrt(b^2 + h^2)) (Howell's catalogue, B-3, with a = b), times pi.
-            let q = 1.0 / (1.0 + h * h as f64).sqrt();
+            let q = 1.0f64 / (1.0f64 + h * h).sqrt();
             let want = 4.0 * q * q.atan();
             let got = irradiance(&square(h), DVec3::Z);
             // Sums of angles near pi/2 whose rounding is 1e-16; far away they cancel down to 1 / h^2.

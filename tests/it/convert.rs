@@ -88,7 +88,7 @@ fn scenes_of_other_programs_survive_with_their_files() {
     let course = write(
         "a.test",
         b"size 48 32\nintegrator pathtracer\nmaxdepth 3\nnexteventestimation mis\ngamma 2.2\ncamera 0 1 5 0 0 0 0 1 0 40\n\
-          quadLight -1 3 -1 2 0 0 0 0 2 8 8 7\nbrdf ggx\nroughness 0.3\ndiffuse 0.2 0.3 0.4\nspecular 0.5 0.4 0.3\n\
+          quadLight -1 3 -1 0 0 2 2 0 0 8 8 7\nbrdf ggx\nroughness 0.3\ndiffuse 0.2 0.3 0.4\nspecular 0.5 0.4 0.3\n\
           scale 1 0.5 1\nsphere 0 0 0 1\nbrdf phong\nvertex -3 -1 -3\nvertex -3 -1 3\nvertex 3 -1 3\ntri 0 1 2\n",
     );
     assert_round_trip(&course, Compat::Exact);

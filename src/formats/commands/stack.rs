@@ -59,6 +59,6 @@ impl TransformStack {
     }
 
     fn multiply(&mut self, by: DAffine3) {
-        self.top = self.top * by;
+        self.top *= by;
     }
 }
