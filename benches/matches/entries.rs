@@ -156,7 +156,7 @@ fn course_sampled() -> Vec<Entry> {
         let checks = std::iter::once(mean).chain((peers.peers > 0).then(|| flip(peers.flip))).collect();
         // Values are clipped at 255 and rounded down, which makes noise a part of the mean: points as good as the scene
         // asks for, independent ones but where it stratifies the light.
-        let stratified = names[0].contains("/hw2/") && !names[0].contains("direct9");
+        let stratified = names[0].contains("hw2/") && !names[0].contains("direct9");
         let sampler = (!stratified).then_some("independent");
         Entry { sampler, ..course(*names, *encoding, checks) }
     };
