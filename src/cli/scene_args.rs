@@ -20,7 +20,7 @@ use std::sync::Arc;
 /// What is rendered.
 #[derive(Args)]
 pub struct SceneArgs {
-    /// Scene file (.toml), or a mesh alone (.obj or .ply, also packed as .gz or .zst)
+    /// Scene file (.toml, .scene, .test), or a mesh alone (.obj or .ply, also packed as .gz or .zst)
     #[arg(value_name = "SCENE|MESH")]
     pub input: PathBuf,
     /// For scenes of other programs: as those show them, or in radiometric units [default: exact]
