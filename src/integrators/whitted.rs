@@ -106,7 +106,7 @@ impl Integrator for Whitted {
         let mut chains: Vec<Chain> =
             (0..batch.rays.len() as u32).map(|index| Chain { beta: Rgb::WHITE, index }).collect();
         let mut later = Later::default();
-        let mut escapes = Escapes::default();
+        let (mut escapes, mut arrivals) = (Escapes::default(), Escapes::default());
         work.counts.camera += batch.rays.len() as u64;
         let mut depth = 1;
         while !chains.is_empty() {
@@ -134,6 +134,9 @@ impl Integrator for Whitted {
                 let spot = Spot::new(scene, v, *chain, batch.ids.get(chain.index as usize), depth);
                 out.li[chain.index as usize] += chain.beta * spot.own_light(scene);
                 self.ask_lights(scene, &spot, &mut work.shadow, &mut later);
+                if work.shadow.len() >= MOST_SHADOW_RAYS {
+                    resolve_shadows(scene, work, &mut later.pending, &mut arrivals, out);
+                }
                 if depth < self.max_depth {
                     spot.reflect(&mut work.next, &mut later.next);
                 }
@@ -144,10 +147,7 @@ impl Integrator for Whitted {
             } else {
                 add_escapes(scene, &chains, &mut escapes, out);
             }
-            work.counts.shadow += work.shadow.len() as u64;
-            scene.kernel.occluded_batch(&work.shadow, &mut work.blocked, Coherence::Incoherent);
-            let shadow = ShadowRays { rays: &work.shadow, blocked: &work.blocked };
-            add_arriving(scene, &later.pending, shadow, &mut escapes, &mut out.li);
+            resolve_shadows(scene, work, &mut later.pending, &mut arrivals, out);
             self.resolve_scattered(scene, work, &mut escapes, &later, out);
             std::mem::swap(&mut chains, &mut later.next);
             std::mem::swap(&mut rays, &mut work.next);
@@ -164,6 +164,26 @@ impl Integrator for Whitted {
 
 fn vertex(scene: &Scene, rays: &RayBatch, hits: &HitBatch, i: usize, spread: f32) -> Option<Vertex> {
     hits.get(i).map(|hit| scene.vertex(&rays.get(i), hit, spread))
+}
+
+/// Shadow rays that wait at a time, and those of one more surface: a scene of a million lamps must not fill the memory.
+const MOST_SHADOW_RAYS: usize = 1 << 16;
+
+/// Traces the shadow rays that wait and adds what arrives. A surface's rays are always together, so that sums do not
+/// depend on where the others' end.
+fn resolve_shadows(
+    scene: &Scene,
+    work: &mut Workspace,
+    pending: &mut Vec<Pending>,
+    arrivals: &mut Escapes,
+    out: &mut PathResults,
+) {
+    work.counts.shadow += work.shadow.len() as u64;
+    scene.kernel.occluded_batch(&work.shadow, &mut work.blocked, Coherence::Incoherent);
+    let shadow = ShadowRays { rays: &work.shadow, blocked: &work.blocked };
+    add_arriving(scene, pending, shadow, arrivals, &mut out.li);
+    work.shadow.clear();
+    pending.clear();
 }
 
 /// Mirrors show the lights at infinity as they are.
@@ -211,7 +231,7 @@ impl<'a> Spot<'a> {
 
     fn light_point(&self, number: u32) -> [f32; 2] {
         // Lights after the first draw from dimensions of their own, far from those of any depth.
-        let dim = Dim::at(self.depth + number * LIGHT_STRIDE, Slot::LightUv);
+        let dim = Dim::at(self.depth.wrapping_add(number.wrapping_mul(LIGHT_STRIDE)), Slot::LightUv);
         self.id.sampler.get_2d(self.id.index, dim)
     }
 
