@@ -133,13 +133,19 @@ pub fn read(path: &Path, mut source: Source) -> Result<MeshData> {
     assemble(&plan, tables)
 }
 
+/// Elements that the mesh is made of.
+const TAKEN: [&str; 3] = ["vertex", "face", "tristrips"];
+
 fn plan(path: &Path, header: Header) -> Result<Plan<'_>> {
     let fail = |message: String| Error::content(path, message);
     let mut vertices = None;
-    let mut elements = Vec::new();
+    let mut elements: Vec<(Element, Role)> = Vec::new();
     for element in header.elements {
-        let role = match element.name.as_str() {
-            "vertex" if vertices.is_some() => return Err(fail("there are two vertex elements".to_string())),
+        let name = element.name.as_str();
+        if TAKEN.contains(&name) && elements.iter().any(|(e, _)| e.name == name) {
+            return Err(fail(format!("there are two {name} elements")));
+        }
+        let role = match name {
             "vertex" => {
                 vertices = Some(u32::try_from(element.count).map_err(|_| {
                     fail(format!("{} vertices are more than an index of 32 bits reaches", element.count))
@@ -165,7 +171,21 @@ fn plan(path: &Path, header: Header) -> Result<Plan<'_>> {
             n => format!("it holds {n} points and no faces; a surface is needed (face or tristrips)"),
         }));
     }
+    if elements.iter().any(|(e, role)| matches!(role, Role::Strips { .. }) && e.count > 0) {
+        leave_out_wedges(path, &mut elements);
+    }
     Ok(Plan { path, format: header.format, elements, vertices })
+}
+
+/// Texture coordinates by corner split vertices, and strips, which have none, would be left with the old ones.
+fn leave_out_wedges(path: &Path, elements: &mut [(Element, Role)]) {
+    for (_, role) in elements {
+        if let Role::Faces { wedge_uvs, .. } = role
+            && wedge_uvs.take().is_some()
+        {
+            log::warn!("{}: texture coordinates by corner beside tristrips are left out", path.display());
+        }
+    }
 }
 
 fn columns(element: &Element) -> Result<Columns, String> {

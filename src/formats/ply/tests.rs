@@ -139,6 +139,10 @@ fn errors_name_the_line_and_what_is_wrong() {
             square(1, "3 0 1 2").replace("element face", "element vertex 1\nproperty int i\nelement face"),
             "two vertex elements",
         ),
+        (
+            square(1, "3 0 1 2").replace("end_header", "element face 0\nproperty list uchar int i\nend_header"),
+            "two face elements",
+        ),
         (square(1, "3 0 1 2").replace("int vertex_ind", "float vertex_ind"), "no list of integers"),
         ("ply\nformat ascii 1.0\nend_header\n".to_string(), "no vertex element"),
     ];
@@ -198,6 +202,18 @@ fn corners_with_different_texture_coordinates_are_split() {
     assert_eq!(mesh.positions.get(2), mesh.positions.get(3));
     assert_eq!(mesh.uvs[2..5], [[1.0, 1.0], [0.5, 1.0], [0.0, 1.0]]);
     assert_eq!(mesh.repairs.bad_attributes, 1);
+}
+
+#[test]
+fn strips_beside_corners_with_texture_coordinates_keep_their_vertices() {
+    let text = square(1, "3 0 1 2 6 0 0 1 0 1 1\n4 0 1 2 3\n").replace(
+        "indices\nend_header",
+        "indices\nproperty list uchar float texcoord\n\
+         element tristrips 1\nproperty list uchar int vertex_indices\nend_header",
+    );
+    let mesh = read(text).unwrap();
+    assert_eq!(mesh.indices, [[0, 1, 2], [0, 1, 2], [2, 1, 3]]);
+    assert!(mesh.positions.len() == 4 && mesh.uvs.is_empty());
 }
 
 #[test]
