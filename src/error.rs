@@ -5,7 +5,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// Every way a command can fail. The message says where, what, and what else was possible.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, Clone, thiserror::Error)]
 pub enum Error {
     /// The command line or a parameter is wrong. Exit code 2.
     #[error("{0}")]

@@ -19,6 +19,7 @@ pub mod integrators;
 pub mod lights;
 pub mod materials;
 pub mod math;
+pub mod memory;
 pub mod render;
 pub mod report;
 pub mod sampler;

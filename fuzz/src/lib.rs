@@ -2,7 +2,11 @@
 
 mod targets;
 
-use std::sync::Once;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind, set_hook};
+use std::sync::{Mutex, Once, PoisonError};
+
+/// What the last panic said.
+static LAST_PANIC: Mutex<String> = Mutex::new(String::new());
 
 /// Makes the text of every message, so that a failure there is found, and drops it.
 struct Sink;
@@ -24,10 +28,18 @@ impl log::Log for Sink {
 /// # Panics
 /// Where a reader breaks what it promises.
 pub fn run(target: &str, data: &[u8]) {
-    static LOGGER: Once = Once::new();
-    LOGGER.call_once(|| {
+    static START: Once = Once::new();
+    START.call_once(|| {
         log::set_logger(&Sink).expect("no other logger");
         log::set_max_level(log::LevelFilter::Info);
+        // The fuzzer's own hook ends the process at once; panics of libraries that the readers catch are no finds.
+        set_hook(Box::new(|info| {
+            *LAST_PANIC.lock().unwrap_or_else(PoisonError::into_inner) =
+                format!("{info}\n{}", std::backtrace::Backtrace::force_capture());
+        }));
     });
-    let _accepted = targets::run(target, data);
+    if let Err(panic) = catch_unwind(AssertUnwindSafe(|| targets::run(target, data))) {
+        eprintln!("{}", LAST_PANIC.lock().unwrap_or_else(PoisonError::into_inner));
+        resume_unwind(panic);
+    }
 }

@@ -44,6 +44,14 @@ pub struct ImageData {
 }
 
 impl ImageData {
+    /// Bytes of its texels.
+    pub fn memory(&self) -> u64 {
+        match &self.texels {
+            Texels::Srgb8(t) | Texels::Linear8(t) => size_of_val(&t[..]) as u64,
+            Texels::F32(t) => size_of_val(&t[..]) as u64,
+        }
+    }
+
     /// Linear value of a texel; `y` counts from the top.
     #[inline]
     pub fn texel(&self, x: usize, y: usize) -> Rgb {

@@ -89,6 +89,19 @@ pub struct MeshData {
 const NORMAL_BATCH: usize = 1 << 17;
 
 impl MeshData {
+    /// Bytes of all arrays.
+    pub fn memory(&self) -> u64 {
+        let positions = match &self.positions {
+            Positions::F32(p) => size_of_val(&p[..]),
+            Positions::F64(p) => size_of_val(&p[..]),
+        };
+        (positions
+            + size_of_val(&self.normals[..])
+            + size_of_val(&self.uvs[..])
+            + size_of_val(&self.indices[..])
+            + size_of_val(&self.material_ids[..])) as u64
+    }
+
     /// Replaces the normals by smooth ones: at each vertex the unit normals of its triangles, weighted by the angle
     /// they span there (Thürmer and Wüthrich, "Computing vertex normals from polygonal facets", 1998), summed in
     /// double precision and in the order of the triangles, so that the result does not depend on the thread count.

@@ -1,6 +1,7 @@
 //! L1: the nouns and traits of the house, without implementations. Imports only L0.
 
 pub mod camera;
+pub mod deferred;
 pub mod directions;
 pub mod geometry;
 pub mod hit;

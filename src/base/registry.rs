@@ -1,6 +1,7 @@
 //! How kinds are registered: a row a kind, with its parameters declared, so that scene files, `skylit list`, hints
 //! and errors all derive from one place.
 
+use crate::base::deferred::Deferred;
 use crate::base::image_data::ImageData;
 use crate::base::mesh_data::MeshData;
 use crate::base::texture::Texture;
@@ -72,14 +73,26 @@ pub enum Value {
     Text(String),
     /// A nested node, such as a texture, before it is built.
     Node(Box<Node>),
-    /// A picture.
-    Image(Arc<ImageData>),
-    /// Six square pictures in the order +X -X +Y -Y +Z -Z.
-    Faces(Arc<[ImageData; 6]>),
+    /// A picture, decoded when it is asked for.
+    Image(Deferred<ImageData>),
+    /// Six square pictures in the order +X -X +Y -Y +Z -Z, decoded when they are asked for.
+    Faces(Deferred<[ImageData; 6]>),
     /// A mesh.
     Mesh(Arc<MeshData>),
     /// A built texture, put in place of its node by the scene builder.
     Texture(Arc<dyn Texture>),
+}
+
+impl Value {
+    /// A picture that is in memory.
+    pub fn image(image: ImageData) -> Self {
+        Value::Image(Deferred::ready(image))
+    }
+
+    /// Six cube faces that are in memory.
+    pub fn faces(faces: [ImageData; 6]) -> Self {
+        Value::Faces(Deferred::ready(faces))
+    }
 }
 
 /// Open plain data: what a scene file says of one thing.
@@ -223,19 +236,19 @@ impl Params {
         }
     }
 
-    /// A picture that must be given.
+    /// A picture that must be given; decodes it.
     pub fn image(&self, name: &str) -> Result<Arc<ImageData>> {
         match self.get(name) {
-            Some(Value::Image(v)) => Ok(v.clone()),
+            Some(Value::Image(v)) => v.get(),
             Some(_) => Err(self.error(name, "takes a picture")),
             None => Err(self.missing(name)),
         }
     }
 
-    /// Six cube faces that must be given.
+    /// Six cube faces that must be given; decodes them.
     pub fn faces(&self, name: &str) -> Result<Arc<[ImageData; 6]>> {
         match self.get(name) {
-            Some(Value::Faces(v)) => Ok(v.clone()),
+            Some(Value::Faces(v)) => v.get(),
             Some(_) => Err(self.error(name, "takes six cube faces")),
             None => Err(self.missing(name)),
         }
@@ -349,6 +362,9 @@ fn check_range(spec: &ParamSpec, params: &Params) -> Result<()> {
             Err(params.error(name, unknown_name("word", word, words.iter().copied())))
         }
         ParamKind::Text => params.text_or(name, "").map(drop),
+        // These may be decoded only when they are used.
+        ParamKind::Image if matches!(params.get(name), Some(Value::Image(_))) => Ok(()),
+        ParamKind::CubeFaces if matches!(params.get(name), Some(Value::Faces(_))) => Ok(()),
         ParamKind::Image => params.image(name).map(drop),
         ParamKind::CubeFaces => params.faces(name).map(drop),
         ParamKind::Mesh => params.mesh(name).map(drop),

@@ -1,13 +1,16 @@
 //! `skylit info`: what is in a scene or a mesh, what it needs, what it will cost.
 
 use super::scene_args::SceneArgs;
-use super::summary::{bytes, count};
+use super::summary::count;
 use super::{Setting, print};
+use crate::accel::BYTES_PER_PRIMITIVE;
 use crate::base::mesh_data::MeshData;
 use crate::base::registry::{Node, Value};
 use crate::error::{Error, Result};
 use crate::image::write::{check_file, write_file};
 use crate::math::aabb::DAabb;
+use crate::memory::in_words;
+use crate::render::film::BYTES_PER_PIXEL;
 use crate::scene::build::{BuildOptions, build};
 use crate::scene::desc::{Content, SceneDesc};
 use crate::scene::{Scene, features::Features};
@@ -85,10 +88,6 @@ struct Info {
     memory: Cost,
 }
 
-/// Embree's tree as measured on meshes of millions of triangles, leaves with their triangles included.
-const KERNEL_BYTES_PER_PRIMITIVE: u64 = 100;
-/// Exact sums and counts of a pixel.
-const FILM_BYTES_PER_PIXEL: u64 = 72;
 /// Objects that the text lists; JSON has them all.
 const MAX_LISTED: usize = 50;
 
@@ -156,8 +155,8 @@ impl Info {
         let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
         self.memory = Cost {
             geometry: report.geometry_bytes,
-            kernel_estimate: (report.triangles + report.procedurals) * KERNEL_BYTES_PER_PRIMITIVE,
-            film_estimate: pixels * FILM_BYTES_PER_PIXEL,
+            kernel_estimate: (report.triangles + report.procedurals) * BYTES_PER_PRIMITIVE,
+            film_estimate: pixels * BYTES_PER_PIXEL,
         };
     }
 }
@@ -249,7 +248,7 @@ impl fmt::Display for Info {
             line(f, "needs", &self.needs.join(", "))?;
         }
         let m = &self.memory;
-        let [geometry, kernel, film] = [m.geometry, m.kernel_estimate, m.film_estimate].map(bytes);
+        let [geometry, kernel, film] = [m.geometry, m.kernel_estimate, m.film_estimate].map(in_words);
         line(f, "memory", &format!("geometry {geometry}, kernel about {kernel}, film about {film}"))
     }
 }

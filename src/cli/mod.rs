@@ -17,7 +17,8 @@ mod sky_arg;
 mod summary;
 
 use crate::error::{Error, Result};
-use args::Threads;
+use crate::memory;
+use args::{Threads, amount};
 use clap::builder::ArgPredicate;
 use clap::error::ErrorKind;
 use clap::{ArgAction, Args, CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -57,6 +58,10 @@ struct Common {
     /// Threads to use: a number, half or max [default: max]
     #[arg(long, global = true, value_name = "N|half|max", help_heading = "Every verb")]
     threads: Option<Threads>,
+    /// The most memory to use, such as 500M or 8G; what would take more is an error before it is loaded [default: no limit]
+    #[arg(long, global = true, value_name = "BYTES", value_parser = |s: &str| amount(s, 1 << 20..=1 << 50))]
+    #[arg(help_heading = "Every verb")]
+    max_memory: Option<u64>,
     /// Nothing on stderr but errors
     #[arg(long, short, global = true, help_heading = "Every verb")]
     quiet: bool,
@@ -114,6 +119,9 @@ fn run() -> Result<(), Failure> {
     let cli = words.and_then(|w| Cli::from_arg_matches(&w)).map_err(Failure::Clap)?;
     start_log(&cli.common);
     interrupt::listen();
+    if let Some(bytes) = cli.common.max_memory {
+        memory::set_limit(bytes);
+    }
     let threads = cli.common.threads.unwrap_or(Threads::Max).count();
     let started = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
     started.map_err(|e| Error::Internal(format!("cannot start {threads} threads: {e}")))?;

@@ -1,6 +1,7 @@
 //! What a render took: for people on stderr, and as JSON.
 
 use crate::error::{Error, Result};
+use crate::memory::{self, in_words};
 use crate::render::Rendered;
 use crate::render::settings::RenderSettings;
 use crate::scene::{BuildReport, Scene};
@@ -12,12 +13,14 @@ use std::time::Duration;
 /// Seconds by stage.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Seconds {
-    /// Reading scene, meshes and pictures.
+    /// Reading scene and meshes.
     pub load: f64,
-    /// Shapes, lights and all else but the kernel.
+    /// Shapes and their places.
     pub scene: f64,
     /// The ray kernel.
     pub kernel: f64,
+    /// Pictures, materials and lights, beside the kernel.
+    pub looks: f64,
     /// From the first ray to the last.
     pub render: f64,
     /// Writing pictures.
@@ -119,6 +122,7 @@ impl Record {
             seconds: Seconds {
                 scene: scene.report.scene_seconds,
                 kernel: scene.report.kernel_seconds,
+                looks: scene.report.look_seconds,
                 render: stats.seconds,
                 ..Seconds::default()
             },
@@ -134,7 +138,7 @@ impl Record {
             memory: Memory {
                 geometry: scene.report.geometry_bytes,
                 kernel: scene.kernel.memory(),
-                peak: peak_memory(),
+                peak: memory::peak(),
             },
             dropped_samples: stats.dropped,
             first_dropped: stats
@@ -150,7 +154,7 @@ impl Record {
         self.seconds.load = load.as_secs_f64();
         self.seconds.save = save.as_secs_f64();
         self.seconds.total = total.as_secs_f64();
-        self.memory.peak = peak_memory();
+        self.memory.peak = memory::peak();
     }
 
     /// What a picture says of how it was made: enough to make it again.
@@ -218,8 +222,9 @@ impl fmt::Display for Record {
         let t = &self.seconds;
         writeln!(
             f,
-            "time    load {:.2} s, scene {:.2} s, kernel {:.2} s, render {:.2} s, save {:.2} s; in all {:.2} s",
-            t.load, t.scene, t.kernel, t.render, t.save, t.total
+            "time    load {:.2} s, scene {:.2} s, kernel {:.2} s beside textures and lights {:.2} s, render {:.2} s, \
+             save {:.2} s; in all {:.2} s",
+            t.load, t.scene, t.kernel, t.looks, t.render, t.save, t.total
         )?;
         let [w, h] = self.size;
         writeln!(
@@ -239,8 +244,8 @@ impl fmt::Display for Record {
             r.mrays_per_second
         )?;
         let m = &self.memory;
-        write!(f, "memory  geometry {}, kernel {}", bytes(m.geometry), bytes(m.kernel))?;
-        writeln!(f, "{}", m.peak.map_or(String::new(), |p| format!("; peak {}", bytes(p))))?;
+        write!(f, "memory  geometry {}, kernel {}", in_words(m.geometry), in_words(m.kernel))?;
+        writeln!(f, "{}", m.peak.map_or(String::new(), |p| format!("; peak {}", in_words(p))))?;
         if s.dropped_primitives > 0 {
             writeln!(
                 f,
@@ -282,23 +287,6 @@ pub fn count(n: u64) -> String {
     out
 }
 
-/// `1.3 GB`, in powers of ten.
-pub fn bytes(n: u64) -> String {
-    match n as f64 {
-        b if b < 1e6 => format!("{:.0} kB", b * 1e-3),
-        b if b < 1e9 => format!("{:.0} MB", b * 1e-6),
-        b => format!("{:.2} GB", b * 1e-9),
-    }
-}
-
-/// The resident set's high-water mark in bytes, as Linux tells it.
-pub fn peak_memory() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
-    let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kilobytes * 1024)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -309,11 +297,6 @@ mod tests {
             ["1", "871,414", "1,000,000"],
             [1, 871414, 1_000_000].map(count).each_ref().map(String::as_str)
         );
-        assert_eq!(bytes(999), "1 kB");
-        assert_eq!(bytes(1_320_000_000), "1.32 GB");
         assert_eq!(plural(1, "shape"), "1 shape");
-        // A test process is larger than a megabyte and smaller than the machine.
-        #[cfg(target_os = "linux")]
-        assert!(peak_memory().is_some_and(|b| (1 << 20..1 << 40).contains(&b)));
     }
 }

@@ -9,7 +9,7 @@ use super::commands::looks::{Look, Looks};
 use super::commands::soup::Soup;
 use super::commands::stack::TransformStack;
 use super::commands::statements::{Skipped, Statement, for_each};
-use super::commands::{attenuation, camera, film_size, light, node, numbers, object, output, radius};
+use super::commands::{attenuation, camera, film_size, fit, light, node, numbers, object, output, radius};
 use crate::base::registry::{Node, Value};
 use crate::color::Transfer;
 use crate::error::{Place, Result};
@@ -24,18 +24,12 @@ use std::sync::Arc;
 pub const FORMAT: SceneFormat = SceneFormat {
     extension: "test",
     doc: "scenes of the course CSE 168",
-    recognise: |head| {
-        const WORDS: &[&str] = &["maxverts", "quadLight", "integrator", "sphere", "lightsamples", "spp"];
-        const OTHERS: &[&str] = &["sph", "elp", "mesh", "OBJ", "skybox", "matType"];
-        let text = String::from_utf8_lossy(head);
-        let words = || text.lines().filter_map(|l| l.split_whitespace().next());
-        words().any(|w| WORDS.contains(&w)) && !words().any(|w| OTHERS.contains(&w))
-    },
+    recognise: |text| fit(text, WORDS, super::seed::WORDS),
     parse,
 };
 
 /// Commands beside those of transforms, looks and triangles.
-const WORDS: &[&str] = &[
+pub(super) const WORDS: &[&str] = &[
     "size",
     "output",
     "maxdepth",

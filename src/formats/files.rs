@@ -1,44 +1,34 @@
-//! The files that a scene names: each is read once, several in parallel, and whoever names the same file shares it.
+//! The files that a scene names: meshes are read once, several in parallel, pictures later and only if they are used;
+//! whoever names the same file shares it.
 
+use crate::base::deferred::Deferred;
 use crate::base::image_data::{Encoding, ImageData, Texels};
 use crate::base::mesh_data::{MeshData, Positions, Repairs};
 use crate::error::{Error, Place, Result};
-use crate::formats::{NamedFiles, load_mesh, sky_files};
-use crate::image::read::read_image;
+use crate::formats::sky_files::SkyFiles;
+use crate::formats::{NamedFiles, load_mesh};
+use crate::image::read::{check_kind, read_image};
 use rayon::prelude::*;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock};
 
-/// Reading a scene goes in rounds: the text is read, the files it asks for are noted and given as placeholders; then
+/// Reading a scene goes in rounds: the text is read, the meshes it asks for are noted and given as placeholders; then
 /// [`Files::read_noted`] reads them all, and the text is read again. So errors of the text come before any large file
-/// is opened, and what a file names in turn (a mesh its pictures) is one round more.
+/// is opened, and what a mesh names in turn (its pictures) is one round more. Of pictures only the first bytes are
+/// looked at here: they are decoded when the scene is built, beside the kernel.
 pub(crate) struct Files {
     /// Relative paths are relative to it; None where no file is to be opened.
     folder: Option<PathBuf>,
-    read: HashMap<Request, Content>,
-    noted: Vec<(Request, bool)>,
-    number_of: HashMap<Request, usize>,
+    meshes: HashMap<PathBuf, Arc<MeshData>>,
+    noted: Vec<PathBuf>,
+    is_noted: HashSet<PathBuf>,
+    images: HashMap<(PathBuf, bool), Deferred<ImageData>>,
+    faces: HashMap<(PathBuf, bool), Deferred<[ImageData; 6]>>,
+    /// Pictures that one can do without and that cannot be used: the warning has been given.
+    unusable: HashSet<PathBuf>,
 }
 
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
-enum Request {
-    Image(PathBuf, bool),
-    Faces(PathBuf, bool),
-    Mesh(PathBuf),
-}
-
-#[derive(Clone)]
-enum Content {
-    Image(Arc<ImageData>),
-    Faces(Arc<[ImageData; 6]>),
-    Mesh(Arc<MeshData>),
-    /// A file one can do without that cannot be used; the warning has been given.
-    Unusable,
-}
-
-static NO_IMAGE: LazyLock<Arc<ImageData>> = LazyLock::new(|| Arc::new(gray()));
-static NO_FACES: LazyLock<Arc<[ImageData; 6]>> = LazyLock::new(|| Arc::new(std::array::from_fn(|_| gray())));
 static NO_MESH: LazyLock<Arc<MeshData>> = LazyLock::new(|| {
     Arc::new(MeshData {
         positions: Positions::F32(Vec::new()),
@@ -52,8 +42,15 @@ static NO_MESH: LazyLock<Arc<MeshData>> = LazyLock::new(|| {
 });
 
 fn gray() -> ImageData {
-    ImageData { width: 1, height: 1, texels: Texels::F32(vec![[0.5; 3]]) }
+    plain([0.5; 3])
 }
+
+fn plain(color: [f32; 3]) -> ImageData {
+    ImageData { width: 1, height: 1, texels: Texels::F32(vec![color]) }
+}
+
+/// What stands in for a picture that one can do without.
+const CONSEQUENCE: &str = "the plain colour is used instead";
 
 impl Files {
     /// Those that the file at `path` names: relative paths are relative to its folder.
@@ -61,9 +58,12 @@ impl Files {
         let folder = path.parent().unwrap_or(Path::new(""));
         Files {
             folder: (named == NamedFiles::Read).then(|| folder.to_owned()),
-            read: HashMap::new(),
+            meshes: HashMap::new(),
             noted: Vec::new(),
-            number_of: HashMap::new(),
+            is_noted: HashSet::new(),
+            images: HashMap::new(),
+            faces: HashMap::new(),
+            unusable: HashSet::new(),
         }
     }
 
@@ -73,7 +73,12 @@ impl Files {
     }
 
     /// A picture that `place` names.
-    pub fn image(&mut self, path: &str, encoding: Option<Encoding>, place: &Place) -> Result<Arc<ImageData>> {
+    pub fn image(
+        &mut self,
+        path: &str,
+        encoding: Option<Encoding>,
+        place: &Place,
+    ) -> Result<Deferred<ImageData>> {
         self.image_at(Path::new(path), encoding, place)
     }
 
@@ -83,12 +88,25 @@ impl Files {
         path: &Path,
         encoding: Option<Encoding>,
         place: &Place,
-    ) -> Result<Arc<ImageData>> {
-        let request = Request::Image(self.resolve(path, place)?, encoding == Some(Encoding::Linear));
-        match self.ask(request, true) {
-            Some(Content::Image(image)) => Ok(image),
-            _ => Ok(NO_IMAGE.clone()),
+    ) -> Result<Deferred<ImageData>> {
+        let path = self.resolve(path, place)?;
+        self.image_of(path, encoding)
+    }
+
+    /// The picture of a file at its one true path.
+    fn image_of(&mut self, path: PathBuf, encoding: Option<Encoding>) -> Result<Deferred<ImageData>> {
+        if !self.are_read() {
+            return Ok(Deferred::ready(gray()));
         }
+        let key = (path, encoding == Some(Encoding::Linear));
+        if let Some(known) = self.images.get(&key) {
+            return Ok(known.clone());
+        }
+        let path = key.0.clone();
+        check_kind(&path)?;
+        let image = Deferred::new(move || read_image(&path, encoding));
+        self.images.insert(key, image.clone());
+        Ok(image)
     }
 
     /// Six cube faces that `place` names.
@@ -97,13 +115,18 @@ impl Files {
         path: &str,
         encoding: Option<Encoding>,
         place: &Place,
-    ) -> Result<Arc<[ImageData; 6]>> {
-        let request =
-            Request::Faces(self.resolve(Path::new(path), place)?, encoding == Some(Encoding::Linear));
-        match self.ask(request, true) {
-            Some(Content::Faces(faces)) => Ok(faces),
-            _ => Ok(NO_FACES.clone()),
+    ) -> Result<Deferred<[ImageData; 6]>> {
+        let key = (self.resolve(Path::new(path), place)?, encoding == Some(Encoding::Linear));
+        if !self.are_read() {
+            return Ok(Deferred::ready(std::array::from_fn(|_| gray())));
         }
+        if let Some(known) = self.faces.get(&key) {
+            return Ok(known.clone());
+        }
+        let files = SkyFiles::find(&key.0)?;
+        let faces = Deferred::new(move || files.faces(encoding));
+        self.faces.insert(key, faces.clone());
+        Ok(faces)
     }
 
     /// A mesh that `place` names.
@@ -113,35 +136,34 @@ impl Files {
 
     /// As [`Files::mesh`], by a path that need not be text.
     pub fn mesh_at(&mut self, path: &Path, place: &Place) -> Result<Arc<MeshData>> {
-        let request = Request::Mesh(self.resolve(path, place)?);
-        match self.ask(request, true) {
-            Some(Content::Mesh(mesh)) => Ok(mesh),
-            _ => Ok(NO_MESH.clone()),
+        let path = self.resolve(path, place)?;
+        if let Some(mesh) = self.meshes.get(&path) {
+            return Ok(mesh.clone());
         }
+        if self.is_noted.insert(path.clone()) {
+            self.noted.push(path);
+        }
+        Ok(NO_MESH.clone())
     }
 
-    /// A picture that a material library names, at a path already resolved. One that is missing or damaged costs a
-    /// warning and is None.
-    pub fn optional_image(&mut self, path: &Path) -> Option<Arc<ImageData>> {
-        match self.ask(Request::Image(path.to_owned(), false), false) {
-            Some(Content::Image(image)) => Some(image),
-            Some(_) => None,
-            None => Some(NO_IMAGE.clone()),
+    /// A picture that a material library names, at a path already resolved. One that is missing costs a warning and is
+    /// None; one that turns out to be damaged costs a warning and is `color` all over.
+    pub fn optional_image(&mut self, path: &Path, color: [f32; 3]) -> Option<Deferred<ImageData>> {
+        if self.unusable.contains(path) {
+            return None;
         }
-    }
-
-    fn ask(&mut self, request: Request, required: bool) -> Option<Content> {
-        if let Some(found) = self.read.get(&request) {
-            return Some(found.clone());
-        }
-        match self.number_of.get(&request) {
-            Some(&i) => self.noted[i].1 |= required,
-            None => {
-                self.number_of.insert(request.clone(), self.noted.len());
-                self.noted.push((request, required));
+        let image = match self.are_read() {
+            true => refuse_devices(path, "").and_then(|()| self.image_of(path.to_owned(), None)),
+            false => Ok(Deferred::ready(gray())),
+        };
+        match image {
+            Ok(image) => Some(image.or(plain(color), CONSEQUENCE)),
+            Err(e) => {
+                log::warn!("{e}; {CONSEQUENCE}");
+                self.unusable.insert(path.to_owned());
+                None
             }
         }
-        None
     }
 
     /// Reads all that was noted; false if nothing was.
@@ -149,22 +171,15 @@ impl Files {
     /// # Errors
     /// The first failure in the order in which the files were named.
     pub fn read_noted(&mut self) -> Result<bool> {
-        self.number_of.clear();
+        self.is_noted.clear();
         let noted = std::mem::take(&mut self.noted);
         if !self.are_read() {
             return Ok(false);
         }
-        let contents: Vec<Result<Content>> = noted.par_iter().map(|(r, _)| r.read()).collect();
+        let meshes: Vec<Result<MeshData>> = noted.par_iter().map(|path| load_mesh(path)).collect();
         let any = !noted.is_empty();
-        for ((request, required), content) in noted.into_iter().zip(contents) {
-            let content = match content {
-                Err(e) if !required => {
-                    log::warn!("{e}; the plain colour is used instead");
-                    Content::Unusable
-                }
-                other => other?,
-            };
-            self.read.insert(request, content);
+        for (path, mesh) in noted.into_iter().zip(meshes) {
+            self.meshes.insert(path, Arc::new(mesh?));
         }
         Ok(any)
     }
@@ -190,21 +205,6 @@ fn refuse_devices(path: &Path, at: &str) -> Result<()> {
         return Ok(());
     }
     Err(Error::file(path, "open", format!("it is neither a file nor a folder{at}")))
-}
-
-impl Request {
-    fn read(&self) -> Result<Content> {
-        let (Request::Image(path, _) | Request::Faces(path, _) | Request::Mesh(path)) = self;
-        refuse_devices(path, "")?;
-        let encoding = |linear: &bool| linear.then_some(Encoding::Linear);
-        Ok(match self {
-            Request::Image(path, linear) => Content::Image(Arc::new(read_image(path, encoding(linear))?)),
-            Request::Faces(path, linear) => {
-                Content::Faces(Arc::new(sky_files::cube_faces(path, encoding(linear))?))
-            }
-            Request::Mesh(path) => Content::Mesh(Arc::new(load_mesh(path)?)),
-        })
-    }
 }
 
 /// Names looked through for a hint in a folder that may hold millions.

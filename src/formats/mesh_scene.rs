@@ -69,15 +69,20 @@ pub(crate) fn material_library(
     Ok(names)
 }
 
+/// Where a library names neither colour nor a picture that can be used: as the neutral material.
+const UNSAID: [f32; 3] = [0.8; 3];
+
 /// The picture alone where there is one: libraries of many programs say black or gray beside it.
 fn diffuse(m: &MeshMaterial, files: &mut Files) -> Node {
-    let picture = m.diffuse_map.as_ref().and_then(|path| files.optional_image(path));
-    let albedo = match (picture, m.diffuse) {
+    // More than all light cannot be sent back, whatever the library says.
+    let color = m.diffuse.map(|color| color.map(|c| c.clamp(0.0, 1.0)));
+    let plain = color.unwrap_or(UNSAID);
+    let picture = m.diffuse_map.as_ref().and_then(|path| files.optional_image(path, plain));
+    let albedo = match (picture, color) {
         (Some(image), _) => {
             Value::Node(Box::new(node("image", Params::new().with("path", Value::Image(image)))))
         }
-        // More than all light cannot be sent back, whatever the library says.
-        (None, Some(color)) => Value::Numbers(color.map(|c| f64::from(c).clamp(0.0, 1.0)).to_vec()),
+        (None, Some(color)) => Value::Numbers(color.map(f64::from).to_vec()),
         (None, None) => return node("diffuse", Params::new()),
     };
     node("diffuse", Params::new().with("albedo", albedo))
@@ -115,9 +120,6 @@ mod tests {
             repairs: Repairs::default(),
         });
         let mut files = Files::of(&dir.path().join("a.obj"), NamedFiles::Read);
-        let mut scene = SceneDesc::default();
-        material_library("m.obj", &mesh, &mut files, &mut scene).unwrap();
-        assert!(files.read_noted().unwrap(), "the picture was asked for, and is no error");
         let mut scene = SceneDesc::default();
         for _ in 0..2 {
             let names = material_library("m.obj", &mesh, &mut files, &mut scene).unwrap();

@@ -47,14 +47,25 @@ pub struct SceneFormat {
     pub extension: &'static str,
     /// One line: what it is.
     pub doc: &'static str,
-    /// Whether the first bytes of a file look like it. It is asked where the extension says nothing, or lies: where
+    /// How a file, or the beginning of one, looks to it. It is asked where the extension says nothing, or lies: where
     /// the content looks like another format and not like this one.
-    recognise: fn(&[u8]) -> bool,
+    recognise: fn(&[u8]) -> Fit,
     parse: fn(&SceneText, &LoadOptions) -> Result<SceneDesc>,
 }
 
 /// Every format of scene files.
 pub static SCENE_FORMATS: &[SceneFormat] = &[native::FORMAT, cse168::FORMAT, seed::FORMAT];
+
+/// How the content of a file looks to a format.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Fit {
+    /// As one of its own.
+    Sure,
+    /// As one of its own, or of another format: the extension decides.
+    Possible,
+    /// As none of its own.
+    Foreign,
+}
 
 /// The content of a scene file.
 pub struct SceneText<'a> {
@@ -186,10 +197,13 @@ pub fn parse(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Scene
 /// The format that the extension names, unless the content says otherwise.
 fn kind_of(path: &Path, bytes: &[u8], named: Option<&'static SceneFormat>) -> Result<Kind> {
     let head = &bytes[..bytes.len().min(HEAD)];
-    if let Some(format) = named.filter(|f| (f.recognise)(head)) {
+    if let Some(format) = named.filter(|f| (f.recognise)(head) != Fit::Foreign) {
         return Ok(Kind::Scene(format));
     }
-    let scene = SCENE_FORMATS.iter().find(|f| (f.recognise)(head)).map(Kind::Scene);
+    let find = |text, fit| SCENE_FORMATS.iter().find(|f| (f.recognise)(text) == fit);
+    // What tells two formats apart may stand behind a million vertices.
+    let unsure = || find(head, Fit::Possible).map(|guess| find(bytes, Fit::Sure).unwrap_or(guess));
+    let scene = find(head, Fit::Sure).or_else(unsure).map(Kind::Scene);
     let found = scene.or_else(|| MESH_FORMATS.iter().find(|f| (f.recognise)(head)).map(Kind::Mesh));
     match (found, named) {
         (Some(found), None) => Ok(found),

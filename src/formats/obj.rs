@@ -25,6 +25,7 @@ use crate::base::mesh_data::{MeshData, Positions, Repairs};
 use crate::error::{Error, Result};
 use crate::formats::source::Source;
 use crate::formats::triangulate::Triangulator;
+use crate::memory;
 use blocks::Blocks;
 use face_materials::Run;
 use glam::DVec3;
@@ -64,6 +65,7 @@ fn read_blocks(path: &Path, blocks: Blocks, library: Option<&[u8]>) -> Result<Me
     if tables.arities.faces == 0 {
         return Err(Error::content(path, no_surface(&tables)));
     }
+    let _room = memory::room(bytes_to_assemble(&tables), || format!("{}: the mesh", path.display()))?;
     Ok(assemble(path, tables, library))
 }
 
@@ -75,6 +77,13 @@ fn no_surface(tables: &Tables) -> String {
             "it holds {points} points, {others} points and lines as elements, and no faces; a surface is needed"
         ),
     }
+}
+
+/// About what the mesh takes beside the tables: a number for each corner and position, and the vertices.
+fn bytes_to_assemble(tables: &Tables) -> u64 {
+    let [positions, uvs, normals] = tables.counts();
+    let corners = tables.corners.len();
+    (12 * corners + (4 + 24) * positions + 8 * uvs + 12 * normals) as u64
 }
 
 /// Makes the mesh of what stands in the file, giving up each table when its part is made.

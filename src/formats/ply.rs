@@ -21,6 +21,7 @@ pub use write::{write_ply, write_ply_to};
 use crate::base::mesh_data::{MeshData, Positions, Repairs};
 use crate::error::{Error, Result};
 use crate::formats::source::Source;
+use crate::memory;
 use faces::Faces;
 use header::{Element, Format, Header, Kind};
 use std::path::Path;
@@ -121,6 +122,7 @@ pub fn read(path: &Path, mut source: Source) -> Result<MeshData> {
     let header = header::parse(path, &bytes, size)?;
     let body = header.body;
     let plan = plan(path, header)?;
+    let _room = memory::room(plan.bytes(), || format!("{}: the mesh", path.display()))?;
     let tables = match plan.format {
         Format::Ascii => {
             source.read_rest(&mut bytes)?;
@@ -131,6 +133,24 @@ pub fn read(path: &Path, mut source: Source) -> Result<MeshData> {
         }
     };
     assemble(&plan, tables)
+}
+
+impl Plan<'_> {
+    /// About the bytes of the tables.
+    fn bytes(&self) -> u64 {
+        let of = |(e, role): &(Element, Role)| {
+            let each = match role {
+                Role::Vertices(c) => {
+                    let position = if c.single { 12 } else { 24 };
+                    position + c.normal.map_or(0, |_| 12) + c.uv.map_or(0, |_| 8)
+                }
+                Role::Faces { .. } => 12,
+                Role::Strips { .. } | Role::Skip => 0,
+            };
+            (e.count as u64).saturating_mul(each)
+        };
+        self.elements.iter().map(of).fold(0, u64::saturating_add)
+    }
 }
 
 /// Elements that the mesh is made of.
@@ -233,6 +253,8 @@ fn assemble(plan: &Plan, tables: Tables) -> Result<MeshData> {
         let message = format!("none of its faces has three corners; it holds {} points", positions.len());
         return Err(Error::content(plan.path, message));
     }
+    let what = || format!("{}: its polygons as triangles", plan.path.display());
+    let _room = memory::room(faces.bytes_of_triangles(), what)?;
     let indices = faces.triangulate(|i| positions.get(i as usize), &mut repairs);
     let mut mesh =
         MeshData { positions, normals, uvs, indices, material_ids: vec![], materials: vec![], repairs };

@@ -5,6 +5,8 @@
 //! - 8-bit pictures are read as linear, and written so;
 //! - the angle of view is cut to a whole degree;
 //! - a mesh without texture coordinates takes the barycentric ones of each triangle;
+//! - v counts from the top row of a picture. So it does on spheres, whose v is 0 at the pole that points up: ours looks
+//!   the same there, as our v is 1 at that pole and counts from the bottom;
 //! - normals are not turned to the viewer;
 //! - nothing is divided by pi, so that a sky lights pi times as bright as in radiometric units, and its `intensity`
 //!   scales that light and not the sky that is seen;
@@ -17,7 +19,9 @@ use super::commands::looks::{Look, Looks};
 use super::commands::soup::Soup;
 use super::commands::stack::TransformStack;
 use super::commands::statements::{Skipped, Statement, for_each};
-use super::commands::{attenuation, camera, film_size, light, locate, node, numbers, object, output, radius};
+use super::commands::{
+    attenuation, camera, film_size, fit, light, locate, node, numbers, object, output, radius,
+};
 use crate::base::image_data::Encoding;
 use crate::base::registry::{Node, Value};
 use crate::color::Transfer;
@@ -34,16 +38,12 @@ use std::sync::Arc;
 pub const FORMAT: SceneFormat = SceneFormat {
     extension: "scene",
     doc: "scenes of the renderer that skylit grew from",
-    recognise: |head| {
-        const WORDS: &[&str] = &["sph", "elp", "OBJ", "mesh", "skybox", "matType", "imageformat"];
-        let text = String::from_utf8_lossy(head);
-        text.lines().filter_map(|l| l.split_whitespace().next()).any(|word| WORDS.contains(&word))
-    },
+    recognise: |text| fit(text, WORDS, super::cse168::WORDS),
     parse,
 };
 
 /// Commands beside those of transforms, looks and triangles.
-const WORDS: &[&str] = &[
+pub(super) const WORDS: &[&str] = &[
     "size",
     "output",
     "maxdepth",
@@ -195,9 +195,10 @@ impl<'a> Reader<'a> {
 
     fn place(&mut self, shape: Node, transform: DAffine3) -> Result<()> {
         let texture = match &self.look.extra.texture {
-            Some(named) => Some(self.texture(&named.clone(), &shape.place)?),
+            Some(named) => Some(self.texture(&named.clone(), shape.kind == MESH, &shape.place)?),
             None => None,
         };
+        self.look.extra.v_down = texture.is_some() && shape.kind == MESH;
         let (look, compat, at) = (&self.look, self.compat, &shape.place);
         let name = self.looks.name_of(look, at, || Ok(material(look, compat, texture, at)))?;
         self.scene.objects.push(object(shape, &name, transform));
@@ -208,10 +209,14 @@ impl<'a> Reader<'a> {
         if self.files.are_read() { locate(self.path, named, place) } else { Ok(PathBuf::from(named)) }
     }
 
-    fn texture(&mut self, named: &str, place: &Place) -> Result<Value> {
+    fn texture(&mut self, named: &str, v_down: bool, place: &Place) -> Result<Value> {
         let path = self.locate(named, place)?;
         let image = self.files.image_at(&path, Some(Encoding::Linear), place)?;
-        let params = vec![("path", Value::Image(image)), ("filter", Value::Text("nearest".into()))];
+        let mut params = vec![("path", Value::Image(image)), ("filter", Value::Text("nearest".into()))];
+        if v_down {
+            params.push(("uv_scale", Value::Numbers(vec![1.0, -1.0])));
+            params.push(("uv_offset", Value::Numbers(vec![0.0, 1.0])));
+        }
         Ok(Value::Node(Box::new(node("image", place, params))))
     }
 
@@ -260,8 +265,11 @@ impl<'a> Reader<'a> {
     }
 }
 
+/// The shape that has texture coordinates of its own.
+const MESH: &str = "mesh";
+
 fn mesh_node(place: &Place, mesh: Value) -> Node {
-    node("mesh", place, vec![("path", mesh), ("missing_uv", Value::Text("barycentric".into()))])
+    node(MESH, place, vec![("path", mesh), ("missing_uv", Value::Text("barycentric".into()))])
 }
 
 fn material(look: &Look, compat: Compat, texture: Option<Value>, place: &Place) -> Node {

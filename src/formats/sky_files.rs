@@ -1,12 +1,12 @@
 //! Skies from picture files: six faces in a folder, a cross, a strip, or one equirectangular picture.
 
+use crate::base::deferred::Deferred;
 use crate::base::image_data::{Encoding, ImageData, Texels};
 use crate::base::registry::{Node, Params, Value};
 use crate::error::{Error, Place, Result};
-use crate::image::read::read_image;
+use crate::image::read::{decode_image, dimensions, read_bytes, read_image};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// Endings of files that count as pictures in a folder.
 const ENDINGS: [&str; 5] = ["png", "jpg", "jpeg", "hdr", "exr"];
@@ -17,40 +17,25 @@ const FACES: [&str; 6] = ["+X", "-X", "+Y", "-Y", "+Z", "-Z"];
 const WHAT: &str = "a sky is a folder of six faces, or one picture: equirectangular (2:1), a cross (4:3 or 3:4) \
                     or a strip of six faces (6:1 or 1:6)";
 
-/// The sky that a file or folder holds: a `cube` or `sphere` node, its pictures read. `encoding` says how 8-bit values
-/// are meant (sRGB when None).
+/// The sky that a file or folder holds: a `cube` or `sphere` node, its pictures found and not yet decoded. `encoding`
+/// says how 8-bit values are meant (sRGB when None).
 ///
 /// # Errors
-/// Nothing there; pictures that cannot be read; a shape or number of pictures that no layout has; a missing face; faces
-/// that are not square or not alike.
+/// Nothing there; a shape or number of pictures that no layout has; a missing face. Pictures that are damaged, and faces
+/// that are not square or not alike, are errors of the node's value.
 pub fn load_sky(path: &Path, encoding: Option<Encoding>) -> Result<Node> {
-    let file = match Source::find(path)? {
-        Source::Faces(files) => return Ok(cube_node(path, read_faces(&files, encoding)?)),
-        Source::Picture(file) => file,
-    };
-    let image = read_image(&file, encoding)?;
-    if image.width == 2 * image.height {
-        return Ok(node(path, "sphere", Value::Image(Arc::new(image))));
-    }
-    Ok(cube_node(path, cut(&file, &image)?))
-}
-
-/// The six faces, in the order +X -X +Y -Y +Z -Z, that a folder, a cross or a strip holds.
-///
-/// # Errors
-/// As [`load_sky`]; an equirectangular picture.
-pub fn cube_faces(path: &Path, encoding: Option<Encoding>) -> Result<[ImageData; 6]> {
-    match Source::find(path)? {
-        Source::Faces(files) => read_faces(&files, encoding),
-        Source::Picture(file) => {
-            let image = read_image(&file, encoding)?;
-            if image.width == 2 * image.height {
-                let message = "is equirectangular: its type is \"sphere\", not \"cube\"";
-                return Err(Error::content(&file, message));
-            }
-            cut(&file, &image)
+    let files = SkyFiles::find(path)?;
+    if let SkyFiles::Picture(file) = &files {
+        let bytes = read_bytes(file)?;
+        let (width, height) = dimensions(file, &bytes)?;
+        if width == 2 * height {
+            let file = file.clone();
+            let image = Deferred::new(move || decode_image(&file, &bytes, encoding));
+            return Ok(node(path, "sphere", Value::Image(image)));
         }
+        layout(file, width, height)?;
     }
+    Ok(node(path, "cube", Value::Faces(Deferred::new(move || files.faces(encoding)))))
 }
 
 fn node(path: &Path, kind: &str, value: Value) -> Node {
@@ -59,22 +44,20 @@ fn node(path: &Path, kind: &str, value: Value) -> Node {
     Node { kind: kind.to_owned(), params, place }
 }
 
-fn cube_node(path: &Path, faces: [ImageData; 6]) -> Node {
-    node(path, "cube", Value::Faces(Arc::new(faces)))
-}
-
-enum Source {
+/// The files that hold a sky.
+pub(crate) enum SkyFiles {
     /// One picture.
     Picture(PathBuf),
-    /// Six, by face.
+    /// Six, by face, in the order +X -X +Y -Y +Z -Z.
     Faces([PathBuf; 6]),
 }
 
-impl Source {
-    fn find(path: &Path) -> Result<Self> {
+impl SkyFiles {
+    /// Those at `path`, a file or a folder.
+    pub fn find(path: &Path) -> Result<Self> {
         let about = std::fs::metadata(path).map_err(|e| Error::file(path, "open", e))?;
         if !about.is_dir() {
-            return Ok(Source::Picture(path.to_owned()));
+            return Ok(SkyFiles::Picture(path.to_owned()));
         }
         let mut files = pictures(path)?;
         match files.len() {
@@ -82,8 +65,26 @@ impl Source {
                 let endings = ENDINGS.join(", ");
                 Err(Error::content(path, format!("no picture (*.{endings}) in this folder; {WHAT}")))
             }
-            1 => Ok(Source::Picture(files.remove(0))),
-            _ => assign(path, files).map(Source::Faces),
+            1 => Ok(SkyFiles::Picture(files.remove(0))),
+            _ => assign(path, files).map(SkyFiles::Faces),
+        }
+    }
+
+    /// The six faces, in the order +X -X +Y -Y +Z -Z, that a folder, a cross or a strip holds.
+    ///
+    /// # Errors
+    /// Pictures that cannot be read; an equirectangular one; faces that are not square or not alike.
+    pub fn faces(&self, encoding: Option<Encoding>) -> Result<[ImageData; 6]> {
+        match self {
+            SkyFiles::Faces(files) => read_faces(files, encoding),
+            SkyFiles::Picture(file) => {
+                let image = read_image(file, encoding)?;
+                if image.width == 2 * image.height {
+                    let message = "is equirectangular: its type is \"sphere\", not \"cube\"";
+                    return Err(Error::content(file, message));
+                }
+                cut(file, &image)
+            }
         }
     }
 }
@@ -248,16 +249,22 @@ const ROW: [Cell; 6] =
 const COLUMN: [Cell; 6] =
     [(0, 0, false), (0, 1, false), (0, 2, false), (0, 3, false), (0, 4, false), (0, 5, false)];
 
+/// The side of a face, and where in a picture of this size each face lies.
+fn layout(file: &Path, w: usize, h: usize) -> Result<(usize, [Cell; 6])> {
+    let layouts = [(4, 3, HORIZONTAL), (3, 4, VERTICAL), (6, 1, ROW), (1, 6, COLUMN)];
+    let fits = |&(across, down, _): &(usize, usize, _)| {
+        w.is_multiple_of(across) && h.is_multiple_of(down) && w / across == h / down
+    };
+    match layouts.into_iter().find(fits) {
+        Some((across, _, cells)) => Ok((w / across, cells)),
+        None => Err(Error::content(file, format!("is {w}x{h}; {WHAT}"))),
+    }
+}
+
 /// The faces of a cross or strip.
 fn cut(file: &Path, image: &ImageData) -> Result<[ImageData; 6]> {
-    let (w, h) = (image.width, image.height);
-    let layouts = [(4, 3, HORIZONTAL), (3, 4, VERTICAL), (6, 1, ROW), (1, 6, COLUMN)];
-    for (across, down, cells) in layouts {
-        if w % across == 0 && h % down == 0 && w / across == h / down {
-            return Ok(cells.map(|c| crop(image, w / across, c)));
-        }
-    }
-    Err(Error::content(file, format!("is {w}x{h}; {WHAT}")))
+    let (size, cells) = layout(file, image.width, image.height)?;
+    Ok(cells.map(|c| crop(image, size, c)))
 }
 
 fn crop(image: &ImageData, size: usize, (column, row, turned): Cell) -> ImageData {

@@ -1,6 +1,7 @@
 //! Reading an input file, whole or piece by piece, decompressing gzip and Zstandard data on the way.
 
 use crate::error::{Error, Result};
+use crate::memory;
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader, Cursor, Read};
 use std::path::Path;
@@ -143,6 +144,7 @@ impl<'a> Source<'a> {
             // A size that memory cannot hold is an error here and not an abort further on. The byte more spares the
             // vector a doubling when it looks for the end.
             let left = size.saturating_add(1).saturating_sub(bytes.len() as u64);
+            let _room = memory::room(left, || self.path.display().to_string())?;
             bytes.try_reserve_exact(usize::try_from(left).unwrap_or(usize::MAX)).map_err(|_| {
                 Error::file(self.path, "read", format!("its {} MiB do not fit in memory", size >> 20))
             })?;
@@ -150,6 +152,10 @@ impl<'a> Source<'a> {
         loop {
             // Packed data is asked for piece by piece, so that a bomb ends at its limit.
             let more = if self.packing.is_some() { PIECE } else { usize::MAX };
+            if self.packing.is_some() {
+                let what = || format!("{}, unpacked", self.path.display());
+                drop(memory::room(bytes.len().max(PIECE) as u64, what)?);
+            }
             if self.fill(bytes, more)? < more {
                 return Ok(());
             }

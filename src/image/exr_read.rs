@@ -2,7 +2,7 @@
 //! decompressed, and only the wanted channels are kept.
 
 use super::picture::{Picture, SampleKind};
-use super::read::{DEFLATE_RATIO, check_size};
+use super::read::{DEFLATE_RATIO, check_size, room_for};
 use crate::base::image_data::{ImageData, Texels};
 use crate::error::{Error, Result};
 use exr::block::chunk::{Chunk, CompressedBlock};
@@ -22,12 +22,10 @@ use std::path::Path;
 /// (a prefix that ends in `Combined`, as Blender's, goes first), else `Y` as gray.
 pub(super) fn decode_colour(path: &Path, bytes: &[u8]) -> Result<ImageData> {
     let reader = open(path, bytes)?;
-    let choice = choose_colour(reader.headers()).ok_or_else(|| {
-        Error::content(path, format!("no channels R, G, B or Y; has: {}", names(reader.headers())))
-    })?;
-    let header = &reader.headers()[choice.layer];
-    let (width, height) = (header.layer_size.x(), header.layer_size.y());
-    check_layer(path, bytes, header)?;
+    let choice = checked_colour(path, bytes, reader.headers())?;
+    let size = reader.headers()[choice.layer].layer_size;
+    let (width, height) = (size.x(), size.y());
+    let _room = room_for(path, (width, height), 12)?;
     let mut texels = vec![[0f32; 3]; width * height];
     decode_layer(path, reader, choice.layer, |channel, at, values| {
         for (component, &wanted) in choice.channels.iter().enumerate() {
@@ -39,12 +37,27 @@ pub(super) fn decode_colour(path: &Path, bytes: &[u8]) -> Result<ImageData> {
     Ok(ImageData { width, height, texels: Texels::F32(texels) })
 }
 
+/// Width and height of what [`decode_colour`] makes, by the headers.
+pub(super) fn dimensions(path: &Path, bytes: &[u8]) -> Result<(usize, usize)> {
+    let reader = open(path, bytes)?;
+    let size = reader.headers()[checked_colour(path, bytes, reader.headers())?.layer].layer_size;
+    Ok((size.x(), size.y()))
+}
+
+fn checked_colour(path: &Path, bytes: &[u8], headers: &[Header]) -> Result<ColourChoice> {
+    let choice = choose_colour(headers)
+        .ok_or_else(|| Error::content(path, format!("no channels R, G, B or Y; has: {}", names(headers))))?;
+    check_layer(path, bytes, &headers[choice.layer])?;
+    Ok(choice)
+}
+
 /// Every channel of the first layer, with text attributes as metadata.
 pub(super) fn decode_planes(path: &Path, bytes: &[u8]) -> Result<Picture> {
     let reader = open(path, bytes)?;
     let header = &reader.headers()[0];
     check_layer(path, bytes, header)?;
     let (width, height) = (header.layer_size.x(), header.layer_size.y());
+    let _room = room_for(path, (width, height), 4 * header.channels.list.len())?;
     let mut picture = Picture::new(width, height);
     picture.set_frame_from(header);
     for channel in &header.channels.list {

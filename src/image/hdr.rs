@@ -1,7 +1,7 @@
 //! Radiance RGBE pictures (G. Ward, "Real Pixels", Graphics Gems II, 1991; the run-length forms as in
 //! Radiance's `filefmts.pdf`): flat, old and new run-length coding, all eight orientations.
 
-use super::read::check_size;
+use super::read::{check_size, room_for};
 use crate::base::image_data::{ImageData, Texels};
 use crate::error::{Error, Result};
 use std::path::Path;
@@ -32,6 +32,7 @@ struct Layout {
 pub(super) fn decode(path: &Path, bytes: &[u8]) -> Result<ImageData> {
     let header = parse_header(path, bytes)?;
     let layout = &header.layout;
+    let _room = room_for(path, (layout.width, layout.height), 12)?;
     let mut texels = vec![[0f32; 3]; layout.width * layout.height];
     let scale: Vec<f32> = (0..256).map(exponent_scale).collect();
     let mut rows = RowReader { data: header.data, row: vec![[0; 4]; header.run] };
@@ -47,6 +48,11 @@ pub(super) fn decode(path: &Path, bytes: &[u8]) -> Result<ImageData> {
         }
     }
     Ok(ImageData { width: layout.width, height: layout.height, texels: Texels::F32(texels) })
+}
+
+/// Width and height, by the header.
+pub(super) fn dimensions(path: &Path, bytes: &[u8]) -> Result<(usize, usize)> {
+    parse_header(path, bytes).map(|h| (h.layout.width, h.layout.height))
 }
 
 /// Value of one mantissa step: 2^(e - 128 - 8), 0 for e = 0.

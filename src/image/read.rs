@@ -8,8 +8,11 @@ use super::{exr_read, hdr};
 use crate::base::image_data::{Encoding, ImageData, Texels};
 use crate::color::srgb_to_linear;
 use crate::error::{Error, Result};
+use crate::memory::{self, Room};
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, Limits};
-use std::io::Cursor;
+use std::fs::File;
+use std::io::{Cursor, Read};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 /// Longest side that is read, in pixels.
@@ -17,6 +20,11 @@ pub const MAX_SIDE: u64 = 65_536;
 
 /// Most pixels that are read from one file (a 32768 x 8192 sky).
 pub const MAX_PIXELS: u64 = 1 << 28;
+
+const PNG_MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
+
+/// Bytes that tell every format.
+const LONGEST_MAGIC: u64 = 10;
 
 /// Deflate packs at most 1032 bytes into one (RFC 1951: a 258-byte match in two bits).
 pub(super) const DEFLATE_RATIO: u64 = 1032;
@@ -35,8 +43,39 @@ const JPEG_PIXELS_PER_BYTE: u64 = 512;
 /// A file that cannot be opened; that is no picture of a known format; that claims more pixels than its length
 /// can hold, or more than [`MAX_PIXELS`] or [`MAX_SIDE`]; that is damaged or cut short.
 pub fn read_image(path: &Path, encoding: Option<Encoding>) -> Result<ImageData> {
-    let bytes = std::fs::read(path).map_err(|e| Error::file(path, "open", e))?;
-    decode_image(path, &bytes, encoding)
+    decode_image(path, &read_bytes(path)?, encoding)
+}
+
+/// All bytes of a picture's file.
+///
+/// # Errors
+/// A file that cannot be opened or read.
+pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
+    std::fs::read(path).map_err(|e| Error::file(path, "open", e))
+}
+
+/// Whether a file begins as a picture does; nothing else of it is read.
+///
+/// # Errors
+/// A file that cannot be opened; that is no picture of a known format.
+pub fn check_kind(path: &Path) -> Result<()> {
+    let fail = |e| Error::file(path, "open", e);
+    let mut head = Vec::new();
+    File::open(path).map_err(fail)?.take(LONGEST_MAGIC).read_to_end(&mut head).map_err(fail)?;
+    sniff(path, &head).map(drop)
+}
+
+/// Width and height of the picture that [`decode_image`] would make, by its header alone.
+///
+/// # Errors
+/// As [`read_image`], but for damage after the header.
+pub fn dimensions(path: &Path, bytes: &[u8]) -> Result<(usize, usize)> {
+    match sniff(path, bytes)? {
+        Format::Png => image_decoder(path, bytes, ImageFormat::Png).map(|d| size_of(&d)),
+        Format::Jpeg => image_decoder(path, bytes, ImageFormat::Jpeg).map(|d| size_of(&d)),
+        Format::Hdr => hdr::dimensions(path, bytes),
+        Format::Exr => exr_read::dimensions(path, bytes),
+    }
 }
 
 /// As [`read_image`], from the bytes of a file; `path` is for messages alone.
@@ -45,12 +84,20 @@ pub fn read_image(path: &Path, encoding: Option<Encoding>) -> Result<ImageData> 
 /// As [`read_image`].
 pub fn decode_image(path: &Path, bytes: &[u8], encoding: Option<Encoding>) -> Result<ImageData> {
     let encoding = encoding.unwrap_or_default();
-    match sniff(path, bytes)? {
+    let format = sniff(path, bytes)?;
+    guarded(path, || match format {
         Format::Png => decode_with_image(path, bytes, ImageFormat::Png, encoding),
         Format::Jpeg => decode_with_image(path, bytes, ImageFormat::Jpeg, encoding),
         Format::Hdr => hdr::decode(path, bytes),
         Format::Exr => exr_read::decode_colour(path, bytes).map(|image| finish(path, image)),
-    }
+    })
+}
+
+/// A fault of a library that decodes is damage of the picture: nothing of what it worked on is looked at again.
+fn guarded<T>(path: &Path, decode: impl FnOnce() -> Result<T>) -> Result<T> {
+    catch_unwind(AssertUnwindSafe(decode)).unwrap_or_else(|_| {
+        Err(Error::content(path, "damaged picture: its decoder came to a state it does not expect"))
+    })
 }
 
 /// Reads a picture as named planes: all channels of the first layer of an EXR file, exactly as stored (NaN
@@ -59,8 +106,7 @@ pub fn decode_image(path: &Path, bytes: &[u8], encoding: Option<Encoding>) -> Re
 /// # Errors
 /// As [`read_image`].
 pub fn read_planes(path: &Path) -> Result<Picture> {
-    let bytes = std::fs::read(path).map_err(|e| Error::file(path, "open", e))?;
-    decode_planes(path, &bytes)
+    decode_planes(path, &read_bytes(path)?)
 }
 
 /// As [`read_planes`], from the bytes of a file; `path` is for messages alone.
@@ -69,7 +115,7 @@ pub fn read_planes(path: &Path) -> Result<Picture> {
 /// As [`read_image`].
 pub fn decode_planes(path: &Path, bytes: &[u8]) -> Result<Picture> {
     if sniff(path, bytes)? == Format::Exr {
-        return exr_read::decode_planes(path, bytes);
+        return guarded(path, || exr_read::decode_planes(path, bytes));
     }
     let image = decode_image(path, bytes, None)?;
     let mut picture = Picture::new(image.width, image.height);
@@ -93,7 +139,7 @@ enum Format {
 
 fn sniff(path: &Path, bytes: &[u8]) -> Result<Format> {
     let known: [(&[u8], Format); 5] = [
-        (b"\x89PNG\r\n\x1a\n", Format::Png),
+        (PNG_MAGIC, Format::Png),
         (b"\xff\xd8\xff", Format::Jpeg),
         (b"#?RADIANCE", Format::Hdr),
         (b"#?RGBE", Format::Hdr),
@@ -127,13 +173,15 @@ pub(super) fn check_size(
     Err(Error::content(path, format!("claims {width} x {height} pixels: {message}")))
 }
 
-fn decode_with_image(
+/// A decoder whose picture's size was checked.
+fn image_decoder<'a>(
     path: &Path,
-    bytes: &[u8],
+    bytes: &'a [u8],
     format: ImageFormat,
-    encoding: Encoding,
-) -> Result<ImageData> {
-    let fail = |e: image::ImageError| Error::content(path, format!("damaged picture: {e}"));
+) -> Result<impl ImageDecoder + use<'a>> {
+    if format == ImageFormat::Png {
+        check_palette(path, bytes)?;
+    }
     let mut reader = image::ImageReader::with_format(Cursor::new(bytes), format);
     let mut limits = Limits::default();
     // The decoded picture (at most 8 bytes a pixel) and the decoder's own rows.
@@ -141,7 +189,7 @@ fn decode_with_image(
     limits.max_image_width = None;
     limits.max_image_height = None;
     reader.limits(limits);
-    let decoder = reader.into_decoder().map_err(fail)?;
+    let decoder = reader.into_decoder().map_err(|e| damaged(path, &e))?;
     let (width, height) = decoder.dimensions();
     let per_byte = match format {
         // One-bit pixels are the densest.
@@ -149,13 +197,60 @@ fn decode_with_image(
         _ => JPEG_PIXELS_PER_BYTE,
     };
     check_size(path, width.into(), height.into(), bytes.len(), per_byte)?;
-    let deep = matches!(
-        decoder.color_type(),
-        ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16
-    );
-    let picture = DynamicImage::from_decoder(decoder).map_err(fail)?;
+    Ok(decoder)
+}
+
+/// PNG's colours come in threes, at most 256 of them; the decoder (png 0.18.1) relies on it.
+fn check_palette(path: &Path, bytes: &[u8]) -> Result<()> {
+    let mut rest = &bytes[PNG_MAGIC.len()..];
+    while let Some((head, body)) = rest.split_first_chunk::<8>() {
+        let [l0, l1, l2, l3, kind @ ..] = *head;
+        let length = u32::from_be_bytes([l0, l1, l2, l3]) as usize;
+        if kind == *b"PLTE" && (!length.is_multiple_of(3) || length > 3 * 256) {
+            let message = format!("damaged picture: {length} bytes are no palette of up to 256 colours");
+            return Err(Error::content(path, message));
+        }
+        // The check sum of four bytes stands behind.
+        rest = body.get(length.saturating_add(4)..).unwrap_or_default();
+    }
+    Ok(())
+}
+
+/// Whether values have 16 bits.
+fn is_deep(decoder: &impl ImageDecoder) -> bool {
+    matches!(decoder.color_type(), ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16)
+}
+
+/// Room for a picture while it is decoded.
+pub(super) fn room_for(path: &Path, size: (usize, usize), bytes_per_pixel: usize) -> Result<Room> {
+    let (width, height) = size;
+    let what = || format!("{}: a picture of {width} x {height}", path.display());
+    memory::room((width * height * bytes_per_pixel) as u64, what)
+}
+
+fn damaged(path: &Path, e: &image::ImageError) -> Error {
+    Error::content(path, format!("damaged picture: {e}"))
+}
+
+fn size_of(decoder: &impl ImageDecoder) -> (usize, usize) {
+    let (width, height) = decoder.dimensions();
+    (width as usize, height as usize)
+}
+
+fn decode_with_image(
+    path: &Path,
+    bytes: &[u8],
+    format: ImageFormat,
+    encoding: Encoding,
+) -> Result<ImageData> {
+    let decoder = image_decoder(path, bytes, format)?;
+    let (width, height) = size_of(&decoder);
+    // Decoded, and turned into texels: bytes of three or four channels, or 16-bit values and floats.
+    let _room = room_for(path, (width, height), if is_deep(&decoder) { 8 + 12 } else { 4 + 4 })?;
+    let deep = is_deep(&decoder);
+    let picture = DynamicImage::from_decoder(decoder).map_err(|e| damaged(path, &e))?;
     let texels = if deep { texels16(&picture, encoding) } else { texels8(picture, encoding) };
-    Ok(ImageData { width: width as usize, height: height as usize, texels })
+    Ok(ImageData { width, height, texels })
 }
 
 fn texels8(picture: DynamicImage, encoding: Encoding) -> Texels {

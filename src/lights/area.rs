@@ -31,6 +31,9 @@ enum Primitives {
 /// More primitives than this are chosen by power alone: a tree takes 100 bytes for each.
 const MOST_IN_TREE: u32 = 1 << 16;
 
+/// Bytes that a lamp takes for each primitive: most for its tree.
+pub const BYTES_PER_PRIMITIVE: u64 = 150;
+
 impl AreaLight {
     /// From a shape in render space, whose primitives have the numbers that hits report, and the materials of its
     /// object by slot. None if nothing of it emits.

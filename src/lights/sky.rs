@@ -8,6 +8,7 @@ use crate::base::skybox::{ChartGrid, ChartPoint, SkyDisc, Skybox};
 use crate::color::Rgb;
 use crate::error::{Error, Result, unknown_name};
 use crate::math::Frame;
+use crate::memory;
 use crate::sampler::hash::extend_unit;
 use crate::sampling::distribution::ChartDistribution;
 use crate::sampling::warp;
@@ -190,6 +191,9 @@ impl SkyLight {
             return Err(Error::Usage("the angle by which a sky is turned is not finite".into()));
         }
         let turn = Turn::new(rotate_y_deg);
+        // Integrals and solid angles of cells in double precision, coarser levels, and the table itself.
+        let cells = sky.grid().cells().min(plan::MAX_CELLS) as u64;
+        let _room = memory::room(48 * cells, || "the table of a sky".into())?;
         let plan = match sky.constant() {
             Some(radiance) => plan_constant(&*sky, f64::from(radiance.luminance()), sampling),
             None => plan::plan(&*sky, sampling),

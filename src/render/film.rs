@@ -22,6 +22,9 @@ pub const TILE_SIDE: u32 = 16;
 /// against one replicate (benches/README.md), two have 1.14 to 1.30 times its mean square error, four had 1.29 to 1.60.
 pub const REPLICATES: usize = 2;
 
+/// Bytes of memory for a pixel: sums, and the layers of a picture that is written (four floats, and four halves).
+pub const BYTES_PER_PIXEL: u64 = 64 + 24;
+
 /// Sums of one pixel, in steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[repr(C, align(64))]

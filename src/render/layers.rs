@@ -10,6 +10,9 @@ use crate::scene::Scene;
 /// Room for a layer's channels.
 const CHANNELS: usize = 4;
 
+/// Bytes of memory for a pixel of a layer: sums and counts, and the floats that are written.
+pub const BYTES_PER_PIXEL: u64 = (8 + 4 + 4) * CHANNELS as u64;
+
 /// Sums over a window: a thread's tile, or the whole picture.
 pub struct Layers {
     layers: Vec<(&'static AovRow, Accumulator)>,

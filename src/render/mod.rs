@@ -11,6 +11,7 @@ pub mod settings;
 use crate::base::pixel_rect::PixelRect;
 use crate::error::{Error, Result};
 use crate::integrators::{Integrator, RayCounts};
+use crate::memory;
 use crate::scene::Scene;
 use block::{BadSample, Job, Worker};
 use film::{Film, REPLICATES};
@@ -99,6 +100,10 @@ impl Renderer {
         let s = &self.settings;
         let start = Instant::now();
         let crop = s.crop;
+        let bytes_per_pixel = film::BYTES_PER_PIXEL + s.aovs.len() as u64 * layers::BYTES_PER_PIXEL;
+        let what = || format!("a film of {} x {}", crop.width(), crop.height());
+        // Held to the end: what is written is made only then.
+        let _room = memory::room(crop.area() as u64 * bytes_per_pixel, what)?;
         progress.begin(crop.area() as u64 * u64::from(s.spp));
         let mut out = Rendered {
             film: Film::new(s.size[0], s.size[1], crop),

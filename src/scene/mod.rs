@@ -4,6 +4,7 @@ pub mod build;
 pub mod desc;
 pub mod features;
 mod groups;
+mod looks;
 pub mod registry;
 
 use crate::base::camera::{Camera, FilmSize};
@@ -81,8 +82,10 @@ pub struct BuildReport {
     pub dropped: Dropped,
     /// Bytes of meshes and other shapes.
     pub geometry_bytes: u64,
-    /// Seconds spent on shapes, lights and everything but the kernel.
+    /// Seconds spent on shapes and their places.
     pub scene_seconds: f64,
+    /// Seconds that pictures, materials and lights took, beside the kernel.
+    pub look_seconds: f64,
     /// Seconds the kernel took to build.
     pub kernel_seconds: f64,
 }

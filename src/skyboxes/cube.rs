@@ -11,6 +11,7 @@ use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::base::skybox::{ChartGrid, ChartPoint, Skybox, integrate_cells};
 use crate::color::Rgb;
 use crate::math::simd;
+use crate::memory;
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
 
@@ -357,7 +358,9 @@ pub const ROW: Row<dyn Skybox> = Row {
         super::ENCODING,
     ],
     build: |p| {
-        let cube = Cube::new(&*p.faces("path")?).map_err(|m| p.error("path", m))?;
+        let faces = p.faces("path")?;
+        let _room = memory::room(faces.iter().map(ImageData::memory).sum(), || "a cube map".into())?;
+        let cube = Cube::new(&faces).map_err(|m| p.error("path", m))?;
         Ok(Arc::new(cube))
     },
     samples,
@@ -366,7 +369,7 @@ pub const ROW: Row<dyn Skybox> = Row {
 fn samples() -> Vec<Params> {
     let of = |size: usize, texel: &dyn Fn(usize, usize) -> [f32; 3]| {
         let faces = std::array::from_fn(|f| texel::picture(size, size, |i| texel(f, i)));
-        Params::new().with("path", Value::Faces(Arc::new(faces)))
+        Params::new().with("path", Value::faces(faces))
     };
     let byte = |f: usize| {
         let texels =
@@ -377,7 +380,7 @@ fn samples() -> Vec<Params> {
         of(1, &|f, _| [f as f32, 0.5, 0.2]),
         of(5, &|f, i| [0.1 + f as f32, i as f32, 0.2]),
         of(40, &|f, i| if (f, i) == (3, 777) { [1e6; 3] } else { [0.0; 3] }),
-        Params::new().with("path", Value::Faces(Arc::new(std::array::from_fn(byte)))),
+        Params::new().with("path", Value::faces(std::array::from_fn(byte))),
     ]
 }
 

@@ -142,7 +142,7 @@ pub const ROW: Row<dyn Skybox> = Row {
 
 fn samples() -> Vec<Params> {
     let of = |w: usize, h: usize, texel: &dyn Fn(usize) -> [f32; 3]| {
-        Params::new().with("path", Value::Image(Arc::new(texel::picture(w, h, texel))))
+        Params::new().with("path", Value::image(texel::picture(w, h, texel)))
     };
     vec![
         of(1, 1, &|_| [0.2, 0.4, 0.6]),

@@ -55,7 +55,7 @@ fn samples() -> Vec<Params> {
     let bytes = |w: usize, h: usize| -> Vec<[u8; 4]> {
         (0..w * h).map(|i| [i * 71 % 256, i * 37 % 256, i * 113 % 256, 255].map(|v| v as u8)).collect()
     };
-    let image = |width, height, texels| Value::Image(Arc::new(ImageData { width, height, texels }));
+    let image = |width, height, texels| Value::image(ImageData { width, height, texels });
     let floats = (0..35).map(|i| [i as f32, 0.25, (i * i % 7) as f32]).collect();
     vec![
         Params::new().with("path", image(5, 3, Texels::Srgb8(bytes(5, 3)))),

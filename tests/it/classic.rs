@@ -1,6 +1,6 @@
 //! Classic ray tracing and closed forms against arithmetic by hand and against each other.
 
-use crate::common::{assert_mean, integrator, mean, render, scene, scene_on};
+use crate::common::{assert_mean, build_on, integrator, mean, render, scene, scene_on};
 use skylit::color::Rgb;
 
 /// A small camera straight above a wide floor, which it sees nearly from one direction.
@@ -144,4 +144,32 @@ fn a_lamp_that_is_grazed_lights_all_the_same() {
     let sampled = mean(&render(&scene, integrator("direct", &[]), 256));
     assert!(exact.value > 0.01, "the wall is seen, and lit: {}", exact.value);
     assert_mean("direct", &sampled, exact.value, 6.0, 1e-3 * exact.value);
+}
+
+/// v of a mesh counts from the top row, and so do pictures on spheres: the pole that points up shows the top row.
+#[test]
+fn pictures_of_the_seed_hang_from_their_top_row() {
+    let dir = tempfile::tempdir().unwrap();
+    let picture = image::RgbImage::from_fn(1, 2, |_, y| image::Rgb([if y == 0 { 255 } else { 51 }; 3]));
+    picture.save(dir.path().join("rows.png")).unwrap();
+    let shown = |shape: &str| {
+        // Lit from where it is looked at, by a light of 1 along the normal.
+        let text = format!(
+            "size 9 9\ncamera 0 4 0 0 0 0 0 0 1 1\ndirectional 0 1 0 1 1 1\ntexture rows.png\n{shape}\n"
+        );
+        let path = dir.path().join("a.scene");
+        std::fs::write(&path, text).unwrap();
+        let scene = build_on("auto", skylit::formats::load(&path).unwrap());
+        center(&scene, "whitted", &[], 1).r
+    };
+    let triangle = |at: &str| format!("{at}\ntri 0 1 2\nmesh m");
+    // The centre of the picture is near the first corner, where v is 0; near the third, where it is 1.
+    let near_first = triangle("vertex -0.1 0 -0.1\nvertex -0.1 0 9\nvertex 9 0 -0.1");
+    let near_third = triangle("vertex -0.1 0 9\nvertex 9 0 -0.1\nvertex -0.1 0 -0.1");
+    // The ball is seen beside its pole; the middle pixel is 0.008 wide there, and its light falls off by 0.2 of that.
+    let tolerance = 1e-3;
+    for (shape, want) in [(near_first.as_str(), 1.0), (&near_third, 0.2), ("sph 0.2 0 0 1", 0.96f32.sqrt())] {
+        let got = shown(shape);
+        assert!((got - want).abs() < tolerance, "{shape}: {got}, not {want}");
+    }
 }

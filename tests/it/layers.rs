@@ -5,7 +5,7 @@ use crate::source::{heads, line_of, production_code, rust_files, words};
 use std::path::{Path, PathBuf};
 
 /// The top-level modules by layer. A new one is entered here once, with the layer that it is meant to have.
-const L0: &[&str] = &["color", "error", "math", "sampler", "sampling"];
+const L0: &[&str] = &["color", "error", "math", "memory", "sampler", "sampling"];
 const L1: &[&str] = &["base"];
 const L2: &[&str] = &["accel", "cameras", "lights", "materials", "shapes", "skyboxes", "textures"];
 const SCENE: &str = "scene";

@@ -15,6 +15,7 @@ mod layers;
 mod light;
 mod matches;
 mod open_house;
+mod pictures;
 mod reference;
 mod seeds;
 mod source;

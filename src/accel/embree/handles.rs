@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::math::simd::Level;
+use crate::memory;
 use embree_sys::*;
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::ptr;
@@ -90,6 +91,10 @@ impl Device {
         let error = self.reports.error.lock().unwrap_or_else(PoisonError::into_inner).take();
         match error {
             None => Ok(()),
+            // Its message says nothing that helps; there is room for what `build_kernel` expects, but not for this.
+            Some((RTC_ERROR_OUT_OF_MEMORY, _)) if memory::is_limited() => {
+                Err(Error::Usage(format!("Embree, while {doing}: it needs more than --max-memory allows")))
+            }
             Some((code, text)) => {
                 let name = error_name(code);
                 Err(Error::Internal(format!("Embree, while {doing}: {name}: {text}")))
@@ -126,10 +131,11 @@ unsafe extern "C" fn keep_error(user: *mut c_void, code: RTCError, text: *const 
     error.get_or_insert_with(|| (code, text.to_string_lossy().into_owned()));
 }
 
+/// Embree gives up what it does, with RTC_ERROR_OUT_OF_MEMORY, where this says false.
 unsafe extern "C" fn count_bytes(user: *mut c_void, bytes: isize, _post: bool) -> bool {
     // SAFETY: `user` is the device's `Reports`, which outlive it.
     unsafe { (*user.cast::<Reports>()).bytes.fetch_add(bytes, Ordering::Relaxed) };
-    true
+    u64::try_from(bytes).map_or(true, memory::fits)
 }
 
 fn error_name(code: RTCError) -> &'static str {

@@ -30,6 +30,8 @@ pub struct Extra {
     pub is_mirror: bool,
     /// Picture instead of the diffuse reflectance, as the file names it.
     pub texture: Option<String>,
+    /// Whether v counts from the top row of that picture instead of the bottom one.
+    pub v_down: bool,
     /// GGX facets of this width instead of the exponent.
     pub ggx_alpha: Option<f64>,
 }

@@ -10,11 +10,36 @@ mod tests;
 
 use crate::base::registry::{Node, Param, Params, Value};
 use crate::error::{Error, Place, Result};
+use crate::formats::Fit;
 use crate::formats::native::check_film;
 use crate::scene::desc::{Content, Loss, ObjectDesc, SceneDesc};
 use glam::{DAffine3, DVec3};
+use looks::Look;
+use soup::Soup;
+use stack::TransformStack;
 use statements::Statement;
 use std::path::{Path, PathBuf};
+
+/// How a text looks to a format of commands: the first command that is in one of `own` and `others` and not in both
+/// decides; with none, any that all such formats have makes it possible.
+pub(super) fn fit(text: &[u8], own: &[&str], others: &[&str]) -> Fit {
+    let mut fit = Fit::Foreign;
+    for line in text.split(|b| *b == b'\n') {
+        let word = line.trim_ascii_start().split(u8::is_ascii_whitespace).next().unwrap_or_default();
+        let Ok(word) = std::str::from_utf8(word) else { continue };
+        match (own.contains(&word), others.contains(&word)) {
+            (true, false) => return Fit::Sure,
+            (false, true) => return Fit::Foreign,
+            (true, true) => fit = Fit::Possible,
+            (false, false) if SHARED.iter().any(|words| words.contains(&word)) => fit = Fit::Possible,
+            (false, false) => {}
+        }
+    }
+    fit
+}
+
+/// Commands of every such format.
+const SHARED: [&[&str]; 3] = [&TransformStack::WORDS, &Look::WORDS, &Soup::WORDS];
 
 /// A node made of a statement.
 pub(super) fn node(kind: &str, place: &Place, params: Vec<(&str, Value)>) -> Node {

@@ -242,6 +242,15 @@ fn content_tells_the_kind_of_file_where_its_name_does_not() {
     let course = "# a comment\nsize 4 4\nintegrator direct\nsphere 0 0 0 1\n";
     assert_eq!(kind(load("a.txt", course)).as_deref(), Some("direct"));
     assert_eq!(kind(load("a", "size 4 4\nsph 0 0 0 1\n")).as_deref(), Some("whitted"));
+    // What tells the two apart may stand behind all that they share; without it, the name decides.
+    let vertices =
+        "size 4 4\nspp 2\ncamera 0 0 4 0 0 0 0 1 0 40\n".to_owned() + &"vertex 0 0 0\n".repeat(5000);
+    for name in ["b.scene", "b"] {
+        let text = vertices.clone() + "vertex 1 0 0\nvertex 0 1 0\ntri 0 5000 5001\nmesh m\n";
+        assert_eq!(kind(load(name, &text)).as_deref(), Some("whitted"), "{name}");
+    }
+    let shared = vertices + "vertex 1 0 0\nvertex 0 1 0\ntri 0 5000 5001\n";
+    assert_eq!(load("c.test", &shared).unwrap().objects.len(), 1);
     // A name that lies costs a warning.
     assert_eq!(kind(load("a.scene", course)).as_deref(), Some("direct"));
     let native = "[render]\nintegrator = \"ao\"\n[[objects]]\nshape = { type = \"sphere\" }\n";

@@ -15,7 +15,7 @@ use crate::color::Transfer;
 use crate::error::{Error, Result};
 use crate::formats::families::{Families, Kind};
 use crate::formats::files::Files;
-use crate::formats::{LoadOptions, NamedFiles, SceneFormat, SceneText};
+use crate::formats::{Fit, LoadOptions, NamedFiles, SceneFormat, SceneText};
 use crate::scene::desc::{Background, Named, ObjectDesc, RenderDesc, SceneDesc, SkyDesc};
 use nodes::NodeTable;
 use std::path::Path;
@@ -37,7 +37,10 @@ pub const FORMAT: SceneFormat = SceneFormat {
         // A section, or a comment before the first one, which no other format begins with.
         let text = String::from_utf8_lossy(head);
         let first = text.lines().map(str::trim).find(|l| !l.is_empty() && !l.starts_with('#'));
-        first.is_some_and(|l| l.starts_with('[') || l.contains('='))
+        match first.is_some_and(|l| l.starts_with('[') || l.contains('=')) {
+            true => Fit::Sure,
+            false => Fit::Foreign,
+        }
     },
     parse: load,
 };

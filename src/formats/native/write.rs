@@ -200,8 +200,8 @@ impl SideFiles {
             Value::Numbers(list) => numbers(list.iter().copied()),
             Value::Text(text) => text.as_str().into(),
             Value::Node(node) => self.table(node)?.into(),
-            Value::Image(image) => self.image(image)?.into(),
-            Value::Faces(faces) => self.faces(faces)?.into(),
+            Value::Image(image) => self.image(&image.get()?)?.into(),
+            Value::Faces(faces) => self.faces(&faces.get()?)?.into(),
             Value::Mesh(mesh) => self.mesh(mesh)?.into(),
             Value::Texture(_) => {
                 return Err(Error::Internal("a texture was built before it was written".into()));
@@ -273,8 +273,9 @@ impl SideFiles {
 fn is_linear(value: &Value) -> bool {
     let linear = |image: &ImageData| matches!(image.texels, Texels::Linear8(_));
     match value {
-        Value::Image(image) => linear(image),
-        Value::Faces(faces) => linear(&faces[0]),
+        // They were decoded to be written; what could not be was an error there.
+        Value::Image(image) => image.get().is_ok_and(|image| linear(&image)),
+        Value::Faces(faces) => faces.get().is_ok_and(|faces| linear(&faces[0])),
         _ => false,
     }
 }

@@ -8,6 +8,7 @@ use super::numbers::first_word;
 use super::statements::{self, Arities, KINDS, Piece};
 use crate::base::mesh_data::Repairs;
 use crate::error::{Error, Place, Result};
+use crate::memory;
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -57,6 +58,9 @@ impl Tables {
         let mut parsed = Vec::new();
         let mut unreadable = None;
         while !(texts.is_empty() && parsed.is_empty()) {
+            // The tables grow by less than the blocks' text, and hold what came before when a vector is moved.
+            let text: usize = texts.iter().map(Vec::len).sum();
+            drop(memory::room(3 * text as u64, || format!("{}: the mesh", path.display()))?);
             let parse = |text: Vec<u8>| Read { piece: statements::read(&text), text };
             let (now, next) = rayon::join(
                 || texts.into_par_iter().map(parse).collect(),

@@ -93,6 +93,15 @@ impl Faces {
         self.triangles.is_empty() && self.polygons.is_empty()
     }
 
+    /// Bytes that [`Faces::triangulate`] takes beside what is there.
+    pub fn bytes_of_triangles(&self) -> u64 {
+        if self.polygons.is_empty() {
+            return 0;
+        }
+        let added = self.polygon_corners.len() - 2 * self.polygons.len();
+        ((self.triangles.len() + added) * size_of::<[u32; 3]>()) as u64
+    }
+
     /// All faces as triangles, in the order in which they came; counts are added to `repairs`.
     pub fn triangulate(self, position: impl Fn(u32) -> DVec3, repairs: &mut Repairs) -> Vec<[u32; 3]> {
         repairs.bad_faces += self.bad_faces;

@@ -140,7 +140,8 @@ fn errors_name_the_line_and_what_is_wrong() {
             "two vertex elements",
         ),
         (
-            square(1, "3 0 1 2").replace("end_header", "element face 0\nproperty list uchar int i\nend_header"),
+            square(1, "3 0 1 2")
+                .replace("end_header", "element face 0\nproperty list uchar int i\nend_header"),
             "two face elements",
         ),
         (square(1, "3 0 1 2").replace("int vertex_ind", "float vertex_ind"), "no list of integers"),

@@ -23,12 +23,14 @@ fn folder(names: &[&str]) -> tempfile::TempDir {
 /// Which of `names` (by number) became which face.
 fn order(names: &[&str]) -> [usize; 6] {
     let dir = folder(names);
-    let faces = cube_faces(dir.path(), Some(Encoding::Linear)).unwrap_or_else(|e| panic!("{names:?}: {e}"));
+    let faces = SkyFiles::find(dir.path()).and_then(|files| files.faces(Some(Encoding::Linear)));
+    let faces = faces.unwrap_or_else(|e| panic!("{names:?}: {e}"));
     faces.map(|f| (f.texel(0, 0).r * 25.5).round() as usize)
 }
 
 fn message(path: &Path) -> String {
-    load_sky(path, None).err().map(|e| e.to_string()).expect("is refused")
+    let built = load_sky(path, None).and_then(|node| build("sky", REGISTRY, &node));
+    built.err().map(|e| e.to_string()).expect("is refused")
 }
 
 #[test]
@@ -89,7 +91,7 @@ fn what_is_no_sky_is_explained() {
     let wide = dir.path().join("wide.png");
     write_png(&wide, 8, 4, |_, _| [9; 3]);
     assert_eq!(load_sky(&wide, None).unwrap().kind, "sphere");
-    assert!(cube_faces(&wide, None).unwrap_err().to_string().contains("\"sphere\""));
+    assert!(SkyFiles::find(&wide).unwrap().faces(None).unwrap_err().to_string().contains("\"sphere\""));
 }
 
 /// A picture that unfolds a cube whose colours are the directions themselves; `None` is left black.

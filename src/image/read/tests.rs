@@ -268,3 +268,25 @@ fn dwab_chunks_cannot_ask_for_any_amount_of_memory() {
         assert!(message.contains("claims more"), "counter {counter}: {message}");
     }
 }
+
+/// 26 bytes of palette: the decoder would look for a third colour value beyond its end.
+#[test]
+fn a_png_whose_palette_is_cut_is_refused() {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, 3, 1);
+    encoder.set_color(png::ColorType::Indexed);
+    encoder.set_palette((0..27).collect::<Vec<u8>>());
+    encoder.write_header().unwrap().write_image_data(&[0, 1, 8]).unwrap();
+    assert_eq!(decode(&bytes).unwrap().texel(2, 0).r, crate::color::srgb_to_linear(24.0 / 255.0));
+    let at = bytes.windows(4).position(|w| w == b"PLTE").unwrap();
+    bytes[at - 1] = 26;
+    bytes.remove(at + 4 + 26);
+    let e = decode(&bytes).unwrap_err().to_string();
+    assert!(e.contains("26 bytes are no palette"), "{e}");
+}
+
+#[test]
+fn what_a_decoder_does_not_expect_is_damage() {
+    let e = guarded(Path::new("a.png"), || -> Result<()> { panic!("index out of bounds") }).unwrap_err();
+    assert!(e.to_string().starts_with("a.png: damaged picture") && e.exit_code() == 2, "{e}");
+}

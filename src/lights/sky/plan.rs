@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Most cells of a table: 36 MB of it, enough for every texel of a 4096 x 2048 map.
-const MAX_CELLS: usize = 1 << 23;
+pub(super) const MAX_CELLS: usize = 1 << 23;
 /// A coarser table is taken if it adds no more than this part to the variance.
 const TOLERANCE: f64 = 0.01;
 /// What a second sample and its shadow ray cost, next to a path without: the table must at least lower the variance

@@ -43,7 +43,7 @@ fn each_sky(mut f: impl FnMut(&str, &Arc<dyn Skybox>)) {
 fn picture(w: usize, h: usize, texel: impl Fn(usize) -> f32) -> Params {
     let texels = (0..w * h).map(|i| [texel(i); 3]).collect();
     let image = ImageData { width: w, height: h, texels: Texels::F32(texels) };
-    Params::new().with("path", Value::Image(Arc::new(image)))
+    Params::new().with("path", Value::image(image))
 }
 
 #[test]

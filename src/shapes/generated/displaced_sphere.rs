@@ -1,7 +1,7 @@
 //! A ball of mountains.
 
 use super::noise::{Fractal, Jet, Noise};
-use super::{Generated, Grid, GridVertex, SEED, TRIANGLES, integer};
+use super::{Generated, Grid, GridVertex, SEED, TRIANGLES, integer, triangles};
 use crate::base::mesh_data::MeshData;
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::base::shape::ShapeSource;
@@ -35,7 +35,7 @@ pub const ROW: Row<dyn ShapeSource> = Row {
         if !(0.1..=100.0).contains(&frequency) || !(0.0..=2.0).contains(&amplitude) {
             return Err(p.error("frequency", "or `amplitude` is out of range"));
         }
-        let triangles = integer(p, &TRIANGLES, 2e5)?;
+        let triangles = triangles(p)?;
         let noise = Noise { seed: integer(p, &SEED, 1.0)? };
         // Six sides of n x n cells of two triangles.
         let n = (f64::from(triangles) / 12.0).sqrt().round() as usize;

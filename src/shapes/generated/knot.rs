@@ -1,6 +1,6 @@
 //! A rope tied into a torus knot.
 
-use super::{Generated, Grid, GridVertex, TRIANGLES, integer};
+use super::{Generated, Grid, GridVertex, TRIANGLES, integer, triangles};
 use crate::base::mesh_data::MeshData;
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::base::shape::ShapeSource;
@@ -63,7 +63,7 @@ pub const ROW: Row<dyn ShapeSource> = Row {
         if (2..=turns.min(coils)).any(|k| turns % k == 0 && coils % k == 0) {
             return Err(p.error("coils", format!("{coils} has a factor in common with `turns` = {turns}")));
         }
-        let triangles = f64::from(integer(p, &TRIANGLES, 2e5)?);
+        let triangles = f64::from(triangles(p)?);
         let rope = Rope {
             turns: f64::from(turns),
             coils: f64::from(coils),

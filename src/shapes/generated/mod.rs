@@ -16,6 +16,7 @@ use crate::base::registry::{ParamKind, ParamSpec, Params};
 use crate::base::shape::{Placed, ShapeSource};
 use crate::error::Result;
 use crate::math::aabb::DAabb;
+use crate::memory;
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 use std::sync::{Arc, OnceLock};
@@ -27,6 +28,17 @@ const TRIANGLES: ParamSpec = ParamSpec {
     default: Some("200000"),
     doc: "about how many: met to a few percent, better for large numbers",
 };
+
+/// Bytes for each triangle: half a vertex with its normal in double and single precision, and three indices.
+const BYTES_PER_TRIANGLE: u64 = 40;
+
+/// The number of triangles, where there is room for them.
+fn triangles(p: &Params) -> Result<u32> {
+    let triangles = integer(p, &TRIANGLES, 2e5)?;
+    let what = || format!("a mesh of {triangles} triangles");
+    drop(memory::room(u64::from(triangles) * BYTES_PER_TRIANGLE, what)?);
+    Ok(triangles)
+}
 
 /// The second one.
 const SEED: ParamSpec = ParamSpec {

@@ -102,7 +102,7 @@ impl ShapeSource for MeshSource {
             Ok(own) => own.data,
             Err(shared) => shared.data.clone(),
         };
-        let placed = place::place(place::Parts::from_shared(data, normals), normals, to_group)?;
+        let placed = place::place(place::Parts::from_shared(data, normals)?, normals, to_group)?;
         let shape = Arc::new(placed.shape.with_missing_uv(missing_uv, to_group));
         Ok(Placed { shape, dropped: placed.dropped })
     }

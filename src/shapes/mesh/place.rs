@@ -9,6 +9,7 @@ use crate::base::ray::MAX_COORDINATE;
 use crate::base::shape::Dropped;
 use crate::error::{Error, Result};
 use crate::math::aabb::{Aabb, DAabb};
+use crate::memory;
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -32,9 +33,12 @@ pub struct Parts {
 
 impl Parts {
     /// Moves the arrays where nobody else holds the mesh, else copies those that are needed.
-    pub fn from_shared(data: Arc<MeshData>, normals: Normals) -> Self {
+    ///
+    /// # Errors
+    /// No room for what is copied.
+    pub fn from_shared(data: Arc<MeshData>, normals: Normals) -> Result<Self> {
         let wanted = normals == Normals::File;
-        match Arc::try_unwrap(data) {
+        Ok(match Arc::try_unwrap(data) {
             Ok(d) => Parts {
                 positions: d.positions,
                 normals: if wanted { d.normals } else { Vec::new() },
@@ -42,14 +46,17 @@ impl Parts {
                 indices: d.indices,
                 slots: d.material_ids,
             },
-            Err(d) => Parts {
-                positions: d.positions.clone(),
-                normals: if wanted { d.normals.clone() } else { Vec::new() },
-                uvs: d.uvs.clone(),
-                indices: d.indices.clone(),
-                slots: d.material_ids.clone(),
-            },
-        }
+            Err(d) => {
+                let _room = memory::room(d.memory(), || "a copy of a mesh".into())?;
+                Parts {
+                    positions: d.positions.clone(),
+                    normals: if wanted { d.normals.clone() } else { Vec::new() },
+                    uvs: d.uvs.clone(),
+                    indices: d.indices.clone(),
+                    slots: d.material_ids.clone(),
+                }
+            }
+        })
     }
 }
 
@@ -100,6 +107,10 @@ pub struct PlacedMesh {
 
 /// Carries a mesh into its group and drops what is no triangle there.
 pub fn place(parts: Parts, normals: Normals, to_group: &DAffine3) -> Result<PlacedMesh> {
+    // In single precision, and with normals of its own.
+    let each = if normals == Normals::Smooth { 12 + 12 } else { 12 };
+    let bytes = each * parts.positions.len() as u64;
+    let _room = memory::room(bytes, || format!("a mesh of {} triangles", parts.indices.len()))?;
     let (mut mesh, slots) = carry(parts, normals, to_group)?;
     let dropped = drop_invalid(&mut mesh, slots);
     if normals == Normals::Smooth {
@@ -111,6 +122,7 @@ pub fn place(parts: Parts, normals: Normals, to_group: &DAffine3) -> Result<Plac
 
 /// A placed mesh after another map, with all of its triangles and their numbers; some may have lost their area.
 pub fn transformed(mesh: &TriangleMesh, by: &DAffine3) -> Result<MeshShape> {
+    let _room = memory::room(mesh.memory(), || "a copy of a mesh".into())?;
     let parts = Parts {
         positions: Positions::F32(mesh.positions().to_vec()),
         normals: mesh.normals.clone(),

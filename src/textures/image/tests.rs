@@ -3,8 +3,8 @@ use super::*;
 fn texture(extra: &[(&str, Value)]) -> Arc<dyn Texture> {
     // Top row: red, green; bottom row: blue, white.
     let texels = vec![[255, 0, 0, 0], [0, 255, 0, 0], [0, 0, 255, 0], [255, 255, 255, 0]];
-    let image = Arc::new(ImageData { width: 2, height: 2, texels: Texels::Srgb8(texels) });
-    let params = Params::new().with("path", Value::Image(image));
+    let image = ImageData { width: 2, height: 2, texels: Texels::Srgb8(texels) };
+    let params = Params::new().with("path", Value::image(image));
     (ROW.build)(&extra.iter().fold(params, |p, (n, v)| p.with(n, v.clone()))).expect("builds")
 }
 
@@ -62,7 +62,7 @@ fn scale_and_offset_move_the_picture() {
 fn encodings_differ_where_they_should() {
     let grey = |extra: Option<&str>, texels| {
         let image = ImageData { width: 1, height: 1, texels };
-        let mut p = Params::new().with("path", Value::Image(Arc::new(image)));
+        let mut p = Params::new().with("path", Value::image(image));
         if let Some(e) = extra {
             p = p.with("encoding", Value::Text(e.into()));
         }

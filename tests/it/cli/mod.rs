@@ -4,6 +4,8 @@ mod bad_input;
 mod bench;
 mod crosscheck;
 mod folder;
+#[cfg(target_os = "linux")]
+mod memory;
 
 use folder::{Folder, QUICK};
 #[cfg(unix)]
