@@ -97,6 +97,11 @@ pub trait Light: Send + Sync {
         sample.li.unwrap_or_else(|| self.le(&PathEnd { wi: sample.wi, vertex: None }))
     }
 
+    /// Whether it shines from one point or direction alone, which no path meets by chance; its samples are all the same.
+    fn is_delta(&self) -> bool {
+        false
+    }
+
     /// Whether paths that leave the scene end on this light.
     fn at_infinity(&self) -> bool {
         false

@@ -293,7 +293,8 @@ impl Whitted {
         }
         let receiver = spot.receiver();
         for (number, light) in (0..).zip(&scene.lights.list) {
-            let Some(l) = light.sample_li(&receiver, spot.light_point(number)) else { continue };
+            let point = if light.is_delta() { [0.0; 2] } else { spot.light_point(number) };
+            let Some(l) = light.sample_li(&receiver, point) else { continue };
             let Some((ray, mut value)) = spot.connect(&l, number) else { continue };
             if light.at_infinity() {
                 value = value * self.sky_light;

@@ -71,6 +71,10 @@ impl Light for Directional {
         })
     }
 
+    fn is_delta(&self) -> bool {
+        true
+    }
+
     fn pdf_li(&self, _at: &Receiver, _end: &PathEnd) -> f32 {
         0.0
     }

@@ -110,6 +110,10 @@ impl Light for PointLight {
         })
     }
 
+    fn is_delta(&self) -> bool {
+        true
+    }
+
     fn pdf_li(&self, _at: &Receiver, _end: &PathEnd) -> f32 {
         0.0
     }

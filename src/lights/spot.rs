@@ -172,6 +172,10 @@ impl Light for SpotLight {
         })
     }
 
+    fn is_delta(&self) -> bool {
+        true
+    }
+
     fn pdf_li(&self, _at: &Receiver, _end: &PathEnd) -> f32 {
         0.0
     }

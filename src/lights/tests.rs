@@ -79,7 +79,7 @@ fn by_samples(light: &dyn Light, p: DVec3, n: Vec3) -> (f32, f32) {
     let mut rng = TestRng::new(2);
     let one = |u: [f32; 2]| {
         light.sample_li(&receiver(p, DVec3::ZERO), u).map_or((true, 0.0), |s| {
-            assert!(!s.delta || s.pdf == 1.0, "{s:?}");
+            assert!(s.delta == light.is_delta() && (!s.delta || s.pdf == 1.0), "{s:?}");
             (s.delta, light.arriving(&s).luminance() * n.dot(s.wi).max(0.0) / s.pdf)
         })
     };

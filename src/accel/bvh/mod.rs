@@ -126,7 +126,7 @@ impl Kernel {
         stack: &mut Stack,
         count: &mut C,
     ) {
-        enter(self.level, Rest::<C, ANY> { kernel: self, root, search, stack, count });
+        C::enter(self.level, Rest::<C, ANY> { kernel: self, root, search, stack, count });
     }
 
     /// The root's level, and where its tree begins; none if the ray meets nothing, or is not valid.
@@ -270,10 +270,10 @@ impl Intersectable for Kernel {
         let mut count = Visits::default();
         match query {
             QueryKind::Closest => {
-                enter(self.level, One::<_, false> { kernel: self, ray, count: &mut count });
+                Visits::enter(self.level, One::<_, false> { kernel: self, ray, count: &mut count });
             }
             QueryKind::Any => {
-                enter(self.level, One::<_, true> { kernel: self, ray, count: &mut count });
+                Visits::enter(self.level, One::<_, true> { kernel: self, ray, count: &mut count });
             }
         }
         Some(count)

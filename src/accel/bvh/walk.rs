@@ -2,7 +2,8 @@
 
 use super::layout::{Child, Node, Target, Tree};
 use super::ray::{BoxRays, Boxes, TreeRay};
-use super::simd::{LANES, Lanes, Simd};
+
+use super::simd::{Available, Job, LANES, Lanes, Portable, Simd, enter};
 use crate::accel::{accepted, failure::Failure, first_crossing};
 use crate::base::geometry::{Group, Leaf};
 use crate::base::hit::Hit;
@@ -119,11 +120,25 @@ impl<'a> Search<'a> {
 pub(super) trait Counter {
     fn node(&mut self) {}
     fn leaf(&mut self, _primitives: impl FnOnce() -> u64) {}
+
+    /// Runs a search that is counted by this.
+    fn enter<J: Job>(level: Available, job: J) -> J::Output;
 }
 
-impl Counter for () {}
+impl Counter for () {
+    #[inline(always)]
+    fn enter<J: Job>(level: Available, job: J) -> J::Output {
+        enter(level, job)
+    }
+}
 
+/// Counting has no hurry, and each set of instructions is another copy of the walk to compile. (Boxes are culled by the
+/// same bounds whatever the instructions; a few in a million differ by a rounding.)
 impl Counter for Visits {
+    fn enter<J: Job>(_level: Available, job: J) -> J::Output {
+        job.run::<Portable>()
+    }
+
     fn node(&mut self) {
         self.nodes += 1;
     }

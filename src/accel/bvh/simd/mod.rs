@@ -11,6 +11,8 @@ mod sse42;
 #[cfg(test)]
 mod tests;
 
+pub(super) use portable::Portable;
+
 use crate::error::{Error, Result};
 use crate::math::simd::Level;
 use bytemuck::{Pod, Zeroable};
@@ -120,6 +122,6 @@ pub(super) fn enter<J: Job>(level: Available, job: J) -> J::Output {
         Level::Avx2 => avx2::enter(level, job),
         #[cfg(target_arch = "x86_64")]
         Level::Sse42 => sse42::enter(level, job),
-        _ => job.run::<portable::Portable>(),
+        _ => job.run::<Portable>(),
     }
 }

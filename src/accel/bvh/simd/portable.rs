@@ -3,7 +3,7 @@
 use super::{LANES, Lanes, Simd};
 
 #[derive(Clone, Copy)]
-pub(super) struct Portable;
+pub struct Portable;
 
 #[inline(always)]
 fn zip(a: Lanes, b: Lanes, f: impl Fn(f32, f32) -> f32) -> Lanes {
