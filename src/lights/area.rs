@@ -2,8 +2,9 @@
 
 use crate::base::light::{EmitterBounds, Extent, Light, LightSample, PathEnd, Receiver};
 use crate::base::material::{Emitter, Material};
-use crate::base::shape::Shape;
+use crate::base::shape::{Shape, ShapeSample};
 use crate::color::Rgb;
+use crate::lights::rectangle::RectangleLamp;
 use crate::lights::tree::{LightTree, union};
 use crate::math::polygon::triangle_irradiance;
 use crate::sampling::distribution::Distribution1D;
@@ -26,6 +27,8 @@ enum Primitives {
     Near(LightTree),
     /// By power alone.
     Power(Distribution1D),
+    /// None is needed: both are one rectangle.
+    Rectangle(RectangleLamp),
 }
 
 /// More primitives than this are chosen by power alone: a tree takes 100 bytes for each.
@@ -42,13 +45,14 @@ impl AreaLight {
         let emitters: Vec<Option<Emitter>> = materials.iter().map(|m| m.emitter()).collect();
         let emitter = |p| emitters[shape.material_slot(p).min(last)];
         let count = shape.primitive_count();
-        let primitives = match count {
-            2..=MOST_IN_TREE => {
+        let primitives = match (rectangle(&*shape, &emitter), count) {
+            (Some(lamp), _) => Primitives::Rectangle(lamp),
+            (None, 2..=MOST_IN_TREE) => {
                 let all: Vec<EmitterBounds> =
                     (0..count).map(|p| primitive_bounds(&*shape, p, emitter(p))).collect();
                 Primitives::Near(LightTree::new(&all)?)
             }
-            _ => {
+            (None, _) => {
                 let weights = (0..count).map(|p| power(&*shape, p, emitter(p)));
                 Primitives::Power(Distribution1D::new(weights)?)
             }
@@ -62,11 +66,27 @@ impl AreaLight {
         Some(AreaLight { shape, materials, primitives, bounds })
     }
 
+    /// What a point of a primitive sends; None if that is nothing.
+    fn light_sample(&self, prim: u32, s: ShapeSample, pdf: f32) -> Option<LightSample> {
+        let li = self.material(prim).emission(s.uv, -s.wi.dot(s.ng));
+        let usable = !li.is_black() && pdf > 0.0 && pdf.is_finite();
+        usable.then_some(LightSample { wi: s.wi, dist: s.dist, li: Some(li), pdf, delta: false })
+    }
+
     #[inline]
     fn material(&self, prim: u32) -> &dyn Material {
         let slot = self.shape.material_slot(prim);
         &**self.materials.get(slot).unwrap_or(&self.materials[self.materials.len() - 1])
     }
+}
+
+/// The rectangle that a shape of two triangles is, if it shines alike from all of it.
+fn rectangle(shape: &dyn Shape, emitter: &dyn Fn(u32) -> Option<Emitter>) -> Option<RectangleLamp> {
+    if shape.primitive_count() != 2 || shape.material_slot(0) != shape.material_slot(1) {
+        return None;
+    }
+    let emitter = emitter(0).filter(|e| e.uniform)?;
+    RectangleLamp::of(shape.triangles()?, emitter.two_sided)
 }
 
 /// Luminous power of a primitive: pi times radiance and area, on each side that shines.
@@ -106,6 +126,10 @@ fn refined(u: [f32; 2]) -> f64 {
 impl Light for AreaLight {
     fn sample_li(&self, at: &Receiver, u: [f32; 2]) -> Option<LightSample> {
         let (prim, pmf, du) = match &self.primitives {
+            Primitives::Rectangle(lamp) => {
+                let s = lamp.sample(at.p, u)?;
+                return self.light_sample(0, s, s.pdf);
+            }
             Primitives::Near(tree) => {
                 let c = tree.sample(at, refined(u))?;
                 (c.emitter, c.pmf, c.du)
@@ -118,17 +142,13 @@ impl Light for AreaLight {
         // Below 1 also after rounding to f32.
         let u = [(du as f32).min(1.0 - f32::EPSILON / 2.0), u[1]];
         let s = self.shape.sample_primitive(prim, at.p, u)?;
-        let li = self.material(prim).emission(s.uv, -s.wi.dot(s.ng));
-        let pdf = pmf as f32 * s.pdf;
-        if li.is_black() || pdf <= 0.0 || !pdf.is_finite() {
-            return None;
-        }
-        Some(LightSample { wi: s.wi, dist: s.dist, li: Some(li), pdf, delta: false })
+        self.light_sample(prim, s, pmf as f32 * s.pdf)
     }
 
     fn pdf_li(&self, at: &Receiver, end: &PathEnd) -> f32 {
         let Some(v) = end.vertex else { return 0.0 };
         let pmf = match &self.primitives {
+            Primitives::Rectangle(lamp) => return lamp.pdf(at.p, v.p),
             Primitives::Near(tree) => tree.pmf(at, v.prim),
             Primitives::Power(table) => table.pmf(v.prim as usize),
         };

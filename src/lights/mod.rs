@@ -4,6 +4,7 @@
 pub mod area;
 mod directional;
 mod point;
+mod rectangle;
 pub mod sampler;
 pub mod sky;
 mod spot;

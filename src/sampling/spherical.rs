@@ -98,16 +98,31 @@ pub struct Rectangle {
     pub edges: [Vec3; 2],
 }
 
-/// Solid angle of the right-angled part of a plane at height z > 0 between its foot and (x, y), signed as x y:
-/// atan(x y / (z r)).
-fn corner_solid_angle(x: f64, y: f64, z: f64) -> f64 {
-    (x * y).atan2(z * (x * x + y * y + z * z).sqrt())
+/// A complex number whose argument is the signed solid angle of the plane at height z > 0 between the lines through its
+/// foot and x, from y0 to y1. Between the foot and (x, y) that is atan(x y / (z r)), so one of four such angles; sums
+/// of angles are products, and one arc tangent at the end gives the same as four.
+fn strip(x: f64, [y0, y1]: [f64; 2], z: f64) -> [f64; 2] {
+    let corner = |y: f64| [z * (x * x + y * y + z * z).sqrt(), x * y];
+    times(corner(y1), conjugate(corner(y0)))
+}
+
+fn times([a, b]: [f64; 2], [c, d]: [f64; 2]) -> [f64; 2] {
+    [a * c - b * d, a * d + b * c]
+}
+
+fn conjugate([re, im]: [f64; 2]) -> [f64; 2] {
+    [re, -im]
+}
+
+fn argument([re, im]: [f64; 2]) -> f64 {
+    im.atan2(re)
 }
 
 /// Solid angle of [x0, x1] x [y0, y1] at height z > 0.
 fn rectangle_solid_angle(x: [f64; 2], y: [f64; 2], z: f64) -> f64 {
-    let strip = |x: f64| corner_solid_angle(x, y[1], z) - corner_solid_angle(x, y[0], z);
-    strip(x[1]) - strip(x[0])
+    let angle = argument(times(strip(x[1], y, z), conjugate(strip(x[0], y, z))));
+    // More than pi comes out negative; what is hardly negative is the rounding of nothing.
+    if angle < -SMALLEST_SOLID_ANGLE { angle + std::f64::consts::TAU } else { angle }
 }
 
 impl SphericalRectangle {
@@ -156,12 +171,11 @@ impl SphericalRectangle {
     /// The x up to which the rectangle fills `area` steradians.
     fn edge_at(&self, area: f64) -> f64 {
         let [x0, x1] = self.x;
-        let [y0, y1] = self.y;
         let z = self.z;
         // The strip from 0 to x fills T(x) = asin(b1 s) - asin(b0 s), with b = y / sqrt(y^2 + z^2) and
         // s = x / sqrt(x^2 + z^2). T is linear in the number that asks, so s is found from
         // sin^2 T = s^2 (b0^2 + b1^2 - 2 b0 b1 cos T), which follows from the cosine of that difference.
-        let t = corner_solid_angle(x0, y1, z) - corner_solid_angle(x0, y0, z) + area;
+        let t = argument(strip(x0, self.y, z)) + area;
         let half = sin_cos_2pi_f64(0.5 * t / std::f64::consts::TAU);
         let [b0, b1] = self.y.map(|y| y / (y * y + z * z).sqrt());
         let spread = (b1 - b0) * (b1 - b0) + 4.0 * b0 * b1 * half.sin * half.sin;

@@ -209,7 +209,9 @@ fn gather_lights(placed: &Placed, desc: &SceneDesc, registry: &Registry) -> Resu
         list.push(source.place(placed.space)?);
     }
     let mut by_path = HashMap::new();
-    if placed.objects.iter().flat_map(|o| &o.materials).any(|m| m.emitter().is_some()) {
+    let emits = |o: &Object| o.materials.iter().any(|m| m.emitter().is_some());
+    let emitting_objects: Vec<bool> = placed.objects.iter().map(emits).collect();
+    if emitting_objects.contains(&true) {
         add_area_lights(placed.geometry, placed.objects, &mut list, &mut by_path)?;
     }
     let at_infinity = (0..list.len() as u32).filter(|&i| list[i as usize].at_infinity()).collect();
@@ -217,7 +219,7 @@ fn gather_lights(placed: &Placed, desc: &SceneDesc, registry: &Registry) -> Resu
     let extent = Extent { center: bounds.center(), radius: bounds.radius().max(1e-3) };
     let name = desc.render.light_sampler.as_deref().unwrap_or(lights::sampler::NAMES[0].0);
     let sampler = lights::sampler::by_name(name, &list, &extent)?;
-    Ok(Lights { list, sampler, at_infinity, by_path })
+    Ok(Lights { list, sampler, at_infinity, emitting_objects, by_path })
 }
 
 /// One light for every placement of an emitting leaf, its shape baked into render space for sampling.

@@ -63,6 +63,8 @@ pub struct Lights {
     pub sampler: Box<dyn LightSampler>,
     /// Those that paths which leave the scene end on.
     pub at_infinity: Vec<u32>,
+    /// Whether a material of each object emits.
+    pub emitting_objects: Vec<bool>,
     /// The light of each emitting leaf, by instance path.
     pub by_path: HashMap<u64, u32>,
 }
@@ -128,7 +130,9 @@ impl Lights {
     /// The light that a vertex lies on.
     #[inline]
     pub fn of_vertex(&self, v: &Vertex) -> Option<u32> {
-        self.by_path.get(&v.path).copied()
+        // Most vertices lie on nothing that emits, and need not be looked for.
+        let emits = self.emitting_objects.get(v.object as usize).is_some_and(|emits| *emits);
+        if emits { self.by_path.get(&v.path).copied() } else { None }
     }
 
     /// What `light` sends along a path that ends at `end`, and the density of sampling it from `from`; None from

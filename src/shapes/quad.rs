@@ -1,11 +1,9 @@
 //! A parallelogram by a corner and two edges, as lamps are often given.
 
-use super::mesh::{MeshSource, Normals};
-use crate::base::mesh_data::{MeshData, Positions, Repairs};
+use super::rectangle::parallelogram;
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::base::shape::ShapeSource;
 use glam::DVec3;
-use std::sync::Arc;
 
 /// The registry row.
 pub const ROW: Row<dyn ShapeSource> = Row {
@@ -31,25 +29,8 @@ pub const ROW: Row<dyn ShapeSource> = Row {
             |name: &str, default| Ok::<_, crate::error::Error>(DVec3::from(p.vector_or(name, default)?));
         let corner = vector("corner", [0.0; 3])?;
         let (a, b) = (vector("edge_a", [1.0, 0.0, 0.0])?, vector("edge_b", [0.0, 0.0, -1.0])?);
-        // Scaled first: products of very long or short edges over- or underflow. What is not a number is not more.
-        let size = a.abs().max_element().max(b.abs().max_element());
-        let (unit_a, unit_b) = (a / size, b / size);
-        let spanned = unit_a.cross(unit_b).length() > 1e-12 * unit_a.length() * unit_b.length();
-        if !spanned {
-            return Err(p.error("edge_b", "and `edge_a` must not be zero or parallel"));
-        }
-        let data = MeshData {
-            positions: Positions::F64(
-                [corner, corner + a, corner + a + b, corner + b].map(|v| v.to_array()).into(),
-            ),
-            normals: Vec::new(),
-            uvs: vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]],
-            indices: vec![[0, 1, 2], [0, 2, 3]],
-            material_ids: Vec::new(),
-            materials: Vec::new(),
-            repairs: Repairs::default(),
-        };
-        Ok(Arc::new(MeshSource::new(Arc::new(data), Normals::Flat)))
+        parallelogram(corner, [a, b])
+            .ok_or_else(|| p.error("edge_b", "and `edge_a` must not be zero or parallel"))
     },
     samples: || {
         let v = |x: f64, y: f64, z: f64| Value::Numbers(vec![x, y, z]);

@@ -30,21 +30,8 @@ pub const ROW: Row<dyn ShapeSource> = Row {
         let center = DVec3::from_array(p.vector_or("center", [0.0; 3])?);
         let u = DVec3::from_array(p.vector_or("edge_u", [1.0, 0.0, 0.0])?);
         let v = DVec3::from_array(p.vector_or("edge_v", [0.0, 0.0, -1.0])?);
-        if u.cross(v).length() <= 1e-12 * u.length() * v.length() {
-            return Err(p.error("edge_v", "and `edge_u` must not be zero or parallel"));
-        }
-        let corner = |a: f64, b: f64| (center + u * a + v * b).to_array();
-        let positions = vec![corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5)];
-        let data = MeshData {
-            positions: Positions::F64(positions),
-            normals: Vec::new(),
-            uvs: vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]],
-            indices: vec![[0, 1, 2], [0, 2, 3]],
-            material_ids: Vec::new(),
-            materials: Vec::new(),
-            repairs: Repairs::default(),
-        };
-        Ok(Arc::new(MeshSource::new(Arc::new(data), Normals::Flat)))
+        parallelogram(center - 0.5 * (u + v), [u, v])
+            .ok_or_else(|| p.error("edge_v", "and `edge_u` must not be zero or parallel"))
     },
     samples: || {
         let v = |x: f64, y: f64, z: f64| Value::Numbers(vec![x, y, z]);
@@ -57,3 +44,22 @@ pub const ROW: Row<dyn ShapeSource> = Row {
         ]
     },
 };
+
+/// Two triangles with texture coordinates along both edges; None where these are zero or parallel.
+pub(super) fn parallelogram(corner: DVec3, [u, v]: [DVec3; 2]) -> Option<Arc<dyn ShapeSource>> {
+    // Scaled first: products of very long or short edges over- or underflow. What is not a number is not more.
+    let size = u.abs().max_element().max(v.abs().max_element());
+    let (unit_u, unit_v) = (u / size, v / size);
+    let spanned = unit_u.cross(unit_v).length() > 1e-12 * unit_u.length() * unit_v.length();
+    let positions = [corner, corner + u, corner + u + v, corner + v].map(|p| p.to_array());
+    let data = MeshData {
+        positions: Positions::F64(positions.into()),
+        normals: Vec::new(),
+        uvs: vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]],
+        indices: vec![[0, 1, 2], [0, 2, 3]],
+        material_ids: Vec::new(),
+        materials: Vec::new(),
+        repairs: Repairs::default(),
+    };
+    spanned.then(|| Arc::new(MeshSource::new(Arc::new(data), Normals::Flat)) as Arc<dyn ShapeSource>)
+}

@@ -13,6 +13,7 @@
 mod batch;
 mod build;
 mod columns;
+mod count;
 mod layout;
 mod open;
 mod ray;
@@ -36,13 +37,14 @@ use crate::base::shape::LocalRay;
 use crate::error::Result;
 use crate::math::aabb::Aabb;
 use batch::Batch;
+use count::Counter;
 use glam::DAffine3;
 use layout::{Child, Instance, Target, Tree};
 use ray::{BoxRays, LevelRay, PlainRay};
 use simd::{Available, Job, Simd, enter};
 use std::cell::Cell;
 use std::sync::Arc;
-use walk::{Counter, Search, Stack, Stop, walk};
+use walk::{Search, Stack, Stop, walk};
 
 /// The table row.
 pub const ROW: KernelRow = KernelRow {

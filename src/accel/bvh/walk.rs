@@ -1,13 +1,13 @@
 //! One ray through one tree.
 
+use super::count::Counter;
 use super::layout::{Child, Node, Target, Tree};
 use super::ray::{BoxRays, Boxes, TreeRay};
 
-use super::simd::{Available, Job, LANES, Lanes, Portable, Simd, enter};
+use super::simd::{LANES, Lanes, Simd};
 use crate::accel::{accepted, failure::Failure, first_crossing};
 use crate::base::geometry::{Group, Leaf};
 use crate::base::hit::Hit;
-use crate::base::intersectable::Visits;
 use crate::base::shape::LocalRay;
 use crate::math::triangle::TriangleRay;
 use bytemuck::{cast_ref, cast_slice_mut};
@@ -113,38 +113,6 @@ impl<'a> Search<'a> {
     pub(super) fn hit(&self) -> Option<Hit> {
         let t = self.t as f32;
         self.found.filter(|_| t.is_finite()).map(|(prim, path)| Hit { t, prim, path })
-    }
-}
-
-/// Counts what a search does, or nothing.
-pub(super) trait Counter {
-    fn node(&mut self) {}
-    fn leaf(&mut self, _primitives: impl FnOnce() -> u64) {}
-
-    /// Runs a search that is counted by this.
-    fn enter<J: Job>(level: Available, job: J) -> J::Output;
-}
-
-impl Counter for () {
-    #[inline(always)]
-    fn enter<J: Job>(level: Available, job: J) -> J::Output {
-        enter(level, job)
-    }
-}
-
-/// Counting has no hurry, and each set of instructions is another copy of the walk to compile. (Boxes are culled by the
-/// same bounds whatever the instructions; a few in a million differ by a rounding.)
-impl Counter for Visits {
-    fn enter<J: Job>(_level: Available, job: J) -> J::Output {
-        job.run::<Portable>()
-    }
-
-    fn node(&mut self) {
-        self.nodes += 1;
-    }
-    fn leaf(&mut self, primitives: impl FnOnce() -> u64) {
-        self.leaves += 1;
-        self.primitives += primitives();
     }
 }
 
