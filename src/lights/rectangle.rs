@@ -3,7 +3,7 @@
 
 use crate::base::mesh::TriangleMesh;
 use crate::base::shape::ShapeSample;
-use crate::sampling::spherical::{Rectangle, SphericalRectangle};
+use crate::sampling::spherical::{RectangleFrame, SphericalRectangle};
 use glam::{DVec3, Vec2, Vec3};
 
 /// How far edges may be from perpendicular and opposite ones from parallel, relative to their length: some roundings of
@@ -15,11 +15,8 @@ const FLAT: f64 = 1e-4;
 
 /// The rectangle that both triangles of a mesh form.
 pub(super) struct RectangleLamp {
-    rectangle: Rectangle,
-    corner: DVec3,
-    edges: [DVec3; 2],
-    /// Unit normal, on the side that both triangles call outer.
-    normal: DVec3,
+    /// Its normal is on the side that both triangles call outer.
+    frame: RectangleFrame,
     area: f64,
     two_sided: bool,
 }
@@ -44,42 +41,41 @@ impl RectangleLamp {
         let [x, y] = edges.map(DVec3::length);
         let open = (vertex(far) - a - edges[1]).length();
         let right = edges[0].dot(edges[1]).abs() <= TOLERANCE * x * y && open <= TOLERANCE * x.min(y);
-        let rectangle = Rectangle { corner: corner.as_vec3(), edges: edges.map(|e| e.as_vec3()) };
-        let cross = edges[0].cross(edges[1]);
-        let normal = cross.try_normalize()?;
-        let lamp = RectangleLamp { rectangle, corner, edges, normal, area: cross.length(), two_sided };
+        let frame = RectangleFrame::new(corner, edges)?;
+        let lamp = RectangleLamp { frame, area: x * y, two_sided };
         right.then_some(lamp)
     }
 
     /// The rectangle as seen from a point; None where it is to be sampled by area.
-    fn seen(&self, from: Vec3) -> Option<SphericalRectangle> {
-        let d2 = (self.corner - from.as_dvec3()).length_squared();
-        let longest = self.edges[0].length_squared().max(self.edges[1].length_squared());
-        if self.area < FLAT * d2 && longest < 0.01 * d2 {
+    fn seen(&self, from: DVec3) -> Option<SphericalRectangle> {
+        let d2 = (self.frame.corner() - from).length_squared();
+        let [x, y] = self.frame.lengths();
+        if self.area < FLAT * d2 && x.max(y) * x.max(y) < 0.01 * d2 {
             return None;
         }
-        SphericalRectangle::new(from, &self.rectangle)
+        SphericalRectangle::of(from, &self.frame)
     }
 
     /// A point of it, uniform over the solid angle, or, where that is small, over the area. None where it is seen edge
     /// on, or from the side that does not shine.
     pub fn sample(&self, from: Vec3, u: [f32; 2]) -> Option<ShapeSample> {
         let o = from.as_dvec3();
-        if !self.two_sided && (o - self.corner).dot(self.normal) <= 0.0 {
+        let (corner, normal) = (self.frame.corner() - o, self.frame.normal());
+        if !self.two_sided && corner.dot(normal) >= 0.0 {
             return None;
         }
-        let (p, pdf) = match self.seen(from) {
-            Some(seen) => {
-                let d = seen.sample(Vec2::from_array(u)).as_dvec3();
-                (o + d * ((self.corner - o).dot(self.normal) / d.dot(self.normal)), Some(seen.pdf()))
+        let (to, pdf) = match self.seen(o) {
+            Some(seen) => (seen.sample_point(Vec2::from_array(u)), Some(seen.pdf())),
+            None => {
+                let [x, y] = self.frame.edges();
+                (corner + x * f64::from(u[0]) + y * f64::from(u[1]), None)
             }
-            None => (self.corner + self.edges[0] * f64::from(u[0]) + self.edges[1] * f64::from(u[1]), None),
         };
-        let (wi, dist) = (p - o).normalize_and_length();
-        let pdf = pdf.unwrap_or_else(|| self.area_pdf(p - o));
+        let (wi, dist) = to.normalize_and_length();
+        let pdf = pdf.unwrap_or_else(|| self.area_pdf(to));
         (pdf > 0.0 && pdf.is_finite() && dist > 0.0).then(|| ShapeSample {
-            p: p.as_vec3(),
-            ng: self.normal.as_vec3(),
+            p: (o + to).as_vec3(),
+            ng: normal.as_vec3(),
             uv: Vec2::ZERO,
             wi: wi.as_vec3(),
             dist: dist as f32,
@@ -89,7 +85,7 @@ impl RectangleLamp {
 
     /// The density per solid angle with which [`RectangleLamp::sample`] takes the direction from `from` to its point `p`.
     pub fn pdf(&self, from: Vec3, p: Vec3) -> f32 {
-        let pdf = match self.seen(from) {
+        let pdf = match self.seen(from.as_dvec3()) {
             Some(seen) => seen.pdf(),
             None => self.area_pdf(p.as_dvec3() - from.as_dvec3()),
         };
@@ -98,7 +94,7 @@ impl RectangleLamp {
 
     /// dist^2 / (cos area), with d = dist times the unit direction.
     fn area_pdf(&self, d: DVec3) -> f32 {
-        (d.length_squared() * d.length() / (self.area * self.normal.dot(d).abs())) as f32
+        (d.length_squared() * d.length() / (self.area * self.frame.normal().dot(d).abs())) as f32
     }
 }
 
@@ -123,7 +119,7 @@ mod tests {
             assert!((lamp.area - 130.0 * 105.0).abs() < 1e-6, "{indices:?}: {}", lamp.area);
             // The corners of the first triangle run counter-clockwise where it is seen from outside.
             let [a, b, c] = indices[0].map(|i| Vec3::from(LAMP[i as usize]).as_dvec3());
-            assert!((b - a).cross(c - a).normalize().dot(lamp.normal) > 1.0 - 1e-12, "{indices:?}");
+            assert!((b - a).cross(c - a).normalize().dot(lamp.frame.normal()) > 1.0 - 1e-12, "{indices:?}");
         }
         // Turned against each other; a fold; a kite; a parallelogram; a third corner of its own.
         assert!(RectangleLamp::of(&mesh(LAMP, [[0, 1, 2], [0, 3, 2]]), true).is_none());

@@ -98,6 +98,44 @@ pub struct Rectangle {
     pub edges: [Vec3; 2],
 }
 
+/// A rectangle with unit vectors along its edges: what does not depend on where it is seen from.
+#[derive(Debug, Clone, Copy)]
+pub struct RectangleFrame {
+    corner: DVec3,
+    /// Along the edges, and across both.
+    axes: [DVec3; 3],
+    lengths: [f64; 2],
+}
+
+impl RectangleFrame {
+    /// None where the edges span nothing.
+    pub fn new(corner: DVec3, edges: [DVec3; 2]) -> Option<Self> {
+        let (x, y) = (edges[0].try_normalize()?, edges[1].try_normalize()?);
+        let normal = x.cross(y).try_normalize()?;
+        Some(RectangleFrame { corner, axes: [x, y, normal], lengths: edges.map(DVec3::length) })
+    }
+
+    /// A corner.
+    pub fn corner(&self) -> DVec3 {
+        self.corner
+    }
+
+    /// The edges from it.
+    pub fn edges(&self) -> [DVec3; 2] {
+        [self.axes[0] * self.lengths[0], self.axes[1] * self.lengths[1]]
+    }
+
+    /// Their lengths.
+    pub fn lengths(&self) -> [f64; 2] {
+        self.lengths
+    }
+
+    /// Unit vector along the first edge times the second.
+    pub fn normal(&self) -> DVec3 {
+        self.axes[2]
+    }
+}
+
 /// A complex number whose argument is the signed solid angle of the plane at height z > 0 between the lines through its
 /// foot and x, from y0 to y1. Between the foot and (x, y) that is atan(x y / (z r)), so one of four such angles; sums
 /// of angles are products, and one arc tangent at the end gives the same as four.
@@ -129,13 +167,17 @@ impl SphericalRectangle {
     /// The rectangle as seen from `p`. `None` if it fills less than [`SMALLEST_SOLID_ANGLE`], or if `p` lies in its
     /// plane, or anything is not finite.
     pub fn new(p: Vec3, rectangle: &Rectangle) -> Option<Self> {
-        let [ex, ey] = rectangle.edges.map(|e| e.as_dvec3());
-        let (x_axis, y_axis) = (ex.try_normalize()?, ey.try_normalize()?);
-        let d = rectangle.corner.as_dvec3() - p.as_dvec3();
-        let normal = x_axis.cross(y_axis).try_normalize()?;
+        let edges = rectangle.edges.map(|e| e.as_dvec3());
+        Self::of(p.as_dvec3(), &RectangleFrame::new(rectangle.corner.as_dvec3(), edges)?)
+    }
+
+    /// As [`SphericalRectangle::new`].
+    pub fn of(p: DVec3, rectangle: &RectangleFrame) -> Option<Self> {
+        let RectangleFrame { corner, axes: [x_axis, y_axis, normal], lengths } = *rectangle;
+        let d = corner - p;
         let z_axis = normal * d.dot(normal).signum();
         let (x0, y0, z) = (d.dot(x_axis), d.dot(y_axis), d.dot(z_axis));
-        let (x, y) = ([x0, x0 + ex.length()], [y0, y0 + ey.length()]);
+        let (x, y) = ([x0, x0 + lengths[0]], [y0, y0 + lengths[1]]);
         let solid_angle = rectangle_solid_angle(x, y, z);
         let usable = z > 0.0 && solid_angle >= SMALLEST_SOLID_ANGLE;
         usable.then_some(SphericalRectangle { axes: [x_axis, y_axis, z_axis], x, y, z, solid_angle })
@@ -158,6 +200,11 @@ impl SphericalRectangle {
 
     /// A unit direction from the point to the rectangle.
     pub fn sample(&self, u: Vec2) -> Vec3 {
+        self.sample_point(u).normalize().as_vec3()
+    }
+
+    /// As [`SphericalRectangle::sample`], as far as the rectangle.
+    pub fn sample_point(&self, u: Vec2) -> DVec3 {
         let x = self.edge_at(f64::from(u.x) * self.solid_angle);
         let d = (x * x + self.z * self.z).sqrt();
         // On a line of constant x the area grows with the sine of the elevation.
@@ -165,7 +212,7 @@ impl SphericalRectangle {
         let h = h0 + f64::from(u.y) * (h1 - h0);
         let y = h * d / ((1.0 - h) * (1.0 + h)).max(1e-300).sqrt();
         let y = y.clamp(self.y[0], self.y[1]);
-        (self.axes[0] * x + self.axes[1] * y + self.axes[2] * self.z).normalize().as_vec3()
+        self.axes[0] * x + self.axes[1] * y + self.axes[2] * self.z
     }
 
     /// The x up to which the rectangle fills `area` steradians.
