@@ -57,7 +57,8 @@ fn contender(name: &str, kernel: impl Intersectable + 'static) -> Contender {
 }
 
 fn plan(scene: &Scene, contenders: Vec<Contender>) -> Plan {
-    let integrator = PathTracer { max_depth: 3, roulette_depth: 4, light_sampling: true, mis: true };
+    let integrator =
+        PathTracer { max_depth: 3, roulette_depth: 4, light_sampling: true, each_light: false, mis: true };
     let settings =
         RenderSettings { spp: 4, threads: 2, ..RenderSettings::new([scene.film.width, scene.film.height]) };
     Plan { contenders, integrator: Arc::new(integrator), settings, oracle_tests: 1 << 28 }

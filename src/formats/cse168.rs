@@ -290,11 +290,8 @@ impl<'a> Reader<'a> {
         let place = Place { path: self.path.to_owned(), ..Place::default() };
         self.scene.render.integrator = Some(self.integrator_node(&place));
         let render = &mut self.scene.render;
-        // Their samples ask every light, ours one of them.
-        let lights = self.quad_lights.max(1);
         render.spp = Some(match self.integrator {
-            Integrator::Direct => self.spp.saturating_mul(self.light_samples).saturating_mul(lights),
-            Integrator::PathTracer if self.next_event != NextEvent::Off => self.spp.saturating_mul(lights),
+            Integrator::Direct => self.spp.saturating_mul(self.light_samples),
             _ => self.spp,
         });
         // One ray a pixel goes through its centre, however many samples of the light there are.
@@ -313,7 +310,7 @@ impl<'a> Reader<'a> {
                 node("whitted", place, vec![number("max_depth", self.max_depth.max(0) + 1)])
             }
             Integrator::AnalyticDirect => node("analytic", place, Vec::new()),
-            Integrator::Direct => node("direct", place, Vec::new()),
+            Integrator::Direct => node("direct", place, vec![("each_light", Value::Bool(true))]),
             Integrator::PathTracer => {
                 // Where light is found by chance alone, the lamp's own surface is one of those counted.
                 let found = i64::from(self.next_event == NextEvent::Off);
@@ -323,6 +320,7 @@ impl<'a> Reader<'a> {
                     number("max_depth", depth),
                     number("roulette_depth", roulette),
                     ("light_sampling", Value::Bool(self.next_event != NextEvent::Off)),
+                    ("each_light", Value::Bool(true)),
                     ("mis", Value::Bool(self.next_event != NextEvent::On)),
                 ];
                 node("path", place, params)

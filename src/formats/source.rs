@@ -43,6 +43,10 @@ impl<'a> Source<'a> {
         if meta.is_dir() {
             return Err(Error::file(path, "read", "it is a folder"));
         }
+        #[cfg(unix)]
+        if std::os::unix::fs::FileTypeExt::is_char_device(&meta.file_type()) {
+            return Err(Error::file(path, "read", "it is a device, which may never end"));
+        }
         let size = meta.is_file().then_some(meta.len());
         Source::of_stream(path, file, meta.len(), size)
     }

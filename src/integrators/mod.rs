@@ -17,12 +17,21 @@ use crate::base::ray::RayBatch;
 use crate::base::registry::Row;
 use crate::base::vertex::Vertex;
 use crate::color::Rgb;
-use crate::sampler::PixelSampler;
+use crate::sampler::{Dim, PixelSampler, Slot};
 use crate::scene::Scene;
 
 /// Every integrator, by name.
 pub static REGISTRY: &[Row<dyn Integrator>] =
     &[path::ROW, direct::ROW, ambient_occlusion::ROW, normals::ROW, whitted::ROW, analytic::ROW];
+
+/// Depths between the sample dimensions of one light and the next: more than any path is long.
+const LIGHT_STRIDE: u32 = 1 << 14;
+
+/// Where the point on a light is drawn at a depth, if each light is sampled: those after the first have dimensions of
+/// their own, far from those of any depth.
+fn light_dim(depth: u32, number: u32) -> Dim {
+    Dim::at(depth.wrapping_add(number.wrapping_mul(LIGHT_STRIDE)), Slot::LightUv)
+}
 
 /// Which sample of which pixel a path is.
 #[derive(Debug, Clone, Copy)]

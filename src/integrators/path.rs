@@ -37,6 +37,7 @@ pub const ROW: Row<dyn Integrator> = Row {
             doc: "first depth at which Russian roulette may end a path",
         },
         LIGHT_SAMPLING,
+        EACH_LIGHT,
         ParamSpec {
             name: "mis",
             kind: ParamKind::Bool,
@@ -47,7 +48,8 @@ pub const ROW: Row<dyn Integrator> = Row {
     build: |p| Ok(Arc::new(PathTracer::from_params(p)?)),
     samples: || {
         let off = |name| Params::new().with(name, Value::Bool(false));
-        vec![Params::new(), off("light_sampling"), off("mis")]
+        let each = Params::new().with("each_light", Value::Bool(true));
+        vec![Params::new(), off("light_sampling"), off("mis"), each]
     },
 };
 
@@ -59,6 +61,17 @@ pub(super) const LIGHT_SAMPLING: ParamSpec = ParamSpec {
     doc: "sample lights at each surface; false leaves them to be found by scattered rays",
 };
 
+/// Shared with `direct`.
+pub(super) const EACH_LIGHT: ParamSpec = ParamSpec {
+    name: "each_light",
+    kind: ParamKind::Bool,
+    default: Some("false"),
+    doc: "sample each light at a surface, not one that is chosen by what it may bring (beyond 1,024 lights always one)",
+};
+
+/// Most lights that are sampled each: a shadow ray for every one of them waits at every surface.
+const MOST_EACH: usize = 1024;
+
 /// The integrator `path`; with a depth of 1 it is `direct`.
 pub struct PathTracer {
     /// See the row.
@@ -67,6 +80,8 @@ pub struct PathTracer {
     pub roulette_depth: u32,
     /// See the row.
     pub light_sampling: bool,
+    /// See the row.
+    pub each_light: bool,
     /// See the row.
     pub mis: bool,
 }
@@ -109,7 +124,7 @@ impl Integrator for PathTracer {
             depth += 1;
             std::mem::swap(&mut paths.states, &mut paths.next);
             std::mem::swap(&mut rays, &mut work.next);
-            let block = Block { scene, ids: &batch.ids, depth, mis: self.mis };
+            let block = self.block(scene, &batch.ids, depth);
             if depth > self.max_depth && !scene.features.emitting_surfaces {
                 block.leave_or_end(&rays, work, &mut paths, out);
                 paths.next.clear();
@@ -133,6 +148,8 @@ pub(super) struct Block<'a> {
     pub depth: u32,
     /// See [`PathTracer::mis`].
     pub mis: bool,
+    /// Whether each light is sampled.
+    pub each_light: bool,
 }
 
 impl PathTracer {
@@ -141,8 +158,14 @@ impl PathTracer {
             max_depth: p.number_or("max_depth", 6.0)? as u32,
             roulette_depth: p.number_or("roulette_depth", 4.0)? as u32,
             light_sampling: p.bool_or("light_sampling", true)?,
+            each_light: p.bool_or("each_light", false)?,
             mis: p.bool_or("mis", true)?,
         })
+    }
+
+    fn block<'a>(&self, scene: &'a Scene, ids: &'a PathIds, depth: u32) -> Block<'a> {
+        let each_light = self.each_light && scene.lights.list.len() <= MOST_EACH;
+        Block { scene, ids, depth, mis: self.mis, each_light }
     }
 
     /// Camera rays: coherent, all of throughput 1, most of them perhaps straight into the sky.
@@ -157,7 +180,7 @@ impl PathTracer {
         let rays = &batch.rays;
         work.counts.camera += rays.len() as u64;
         scene.kernel.intersect_batch(rays, &mut work.hits, Coherence::Coherent);
-        let block = Block { scene, ids: &batch.ids, depth: 1, mis: self.mis };
+        let block = self.block(scene, &batch.ids, 1);
         paths.begin(&mut work.next, &mut work.shadow);
         if work.hits.none() {
             // Most batches of most pictures: nothing but sky, and nothing to sort out.
@@ -306,6 +329,15 @@ impl Block<'_> {
         }
     }
 
+    /// The density per solid angle with which light samples from `from` find `end` on a light.
+    #[inline]
+    fn light_pdf(&self, light: u32, end: &PathEnd, from: &Receiver) -> f32 {
+        match self.each_light {
+            true => self.scene.lights.list[light as usize].pdf_li(from, end),
+            false => self.scene.lights.pdf(light, end, from),
+        }
+    }
+
     /// The light that a path's end lies on, if it does.
     #[inline]
     fn add_emission(&self, state: &PathState, v: &Vertex, wi: Vec3, out: &mut PathResults) {
@@ -325,7 +357,7 @@ impl Block<'_> {
             for e in escapes.ask(&*lights.list[light as usize]).filter(|e| !e.le.is_black()) {
                 let state = &states[e.number as usize];
                 let end = PathEnd { wi: e.wi, vertex: None };
-                let pdf = || lights.pdf(light, &end, &state.from);
+                let pdf = || self.light_pdf(light, &end, &state.from);
                 let weight = if state.pdf.is_finite() { self.weight(state, pdf()) } else { 1.0 };
                 out.li[state.index as usize] += state.beta * e.le * weight;
             }
@@ -334,10 +366,14 @@ impl Block<'_> {
 
     #[inline]
     fn add_end(&self, state: &PathState, light: u32, end: &PathEnd, out: &mut PathResults) {
-        let from = state.pdf.is_finite().then_some(&state.from);
-        let e = self.scene.lights.emitted(light, end, from);
-        let weight = if from.is_some() { self.weight(state, e.pdf) } else { 1.0 };
-        out.li[state.index as usize] += state.beta * e.le * weight;
+        let le = self.scene.lights.list[light as usize].le(end);
+        if le.is_black() {
+            return;
+        }
+        // Light sampling could not have found what the camera or a delta lobe sees.
+        let competes = state.pdf.is_finite();
+        let weight = if competes { self.weight(state, self.light_pdf(light, end, &state.from)) } else { 1.0 };
+        out.li[state.index as usize] += state.beta * le * weight;
     }
 }
 

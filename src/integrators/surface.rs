@@ -3,11 +3,11 @@
 //! A few points are worked on at once, stage by stage: the form that lights and shapes with a batch of their own would
 //! need. By itself it is no faster than one point after the other (measured).
 
-use super::PathId;
 use super::Workspace;
 use super::path::{Block, PathScratch, PathState, PathTracer};
 use super::pending::Pending;
 use super::points::VertexPoint;
+use super::{PathId, light_dim};
 use crate::base::light::{ChosenLight, LightSample, Receiver};
 use crate::base::material::{Material, Prepared, Transmission};
 use crate::base::vertex::Vertex;
@@ -72,7 +72,11 @@ impl PathTracer {
         for s in surfaces.iter_mut() {
             s.material.prepare(&s.v, &mut s.prepared);
         }
-        if self.light_sampling {
+        if self.light_sampling && block.each_light {
+            for s in surfaces.iter().filter(|s| !s.material.is_delta()) {
+                block.ask_each(s, work, paths);
+            }
+        } else if self.light_sampling {
             for s in surfaces.iter_mut().filter(|s| !s.material.is_delta()) {
                 s.lit = block.sample_light(&s.receiver, &paths.points.get(s.number));
             }
@@ -138,6 +142,21 @@ impl Block<'_> {
         };
         let sample = lights.list.get(chosen.light as usize)?.sample_li(at, point.light)?;
         Some((chosen, sample))
+    }
+
+    /// A point on each light, and a shadow ray to it.
+    fn ask_each(&self, s: &Surface, work: &mut Workspace, paths: &mut PathScratch) {
+        let point = paths.points.get(s.number);
+        for (number, light) in (0..).zip(&self.scene.lights.list) {
+            let u = match number {
+                _ if light.is_delta() => [0.0; 2],
+                0 => point.light,
+                _ => point.id.sampler.get_2d(point.id.index, light_dim(self.depth, number)),
+            };
+            if let Some(l) = light.sample_li(&s.receiver, u) {
+                self.connect(s, ChosenLight { light: number, pmf: 1.0 }, &l, work, paths);
+            }
+        }
     }
 
     /// A shadow ray to what was sampled of a light.

@@ -5,7 +5,7 @@
 use super::escapes::Escapes;
 use super::path::first_hit;
 use super::pending::{Pending, ShadowRays, add_arriving};
-use super::{CameraBatch, Integrator, PathId, PathResults, Workspace};
+use super::{CameraBatch, Integrator, PathId, PathResults, Workspace, light_dim};
 use crate::base::hit::HitBatch;
 use crate::base::light::{LightSample, PathEnd, Receiver};
 use crate::base::material::{Material, Prepared};
@@ -230,9 +230,7 @@ impl<'a> Spot<'a> {
     }
 
     fn light_point(&self, number: u32) -> [f32; 2] {
-        // Lights after the first draw from dimensions of their own, far from those of any depth.
-        let dim = Dim::at(self.depth.wrapping_add(number.wrapping_mul(LIGHT_STRIDE)), Slot::LightUv);
-        self.id.sampler.get_2d(self.id.index, dim)
+        self.id.sampler.get_2d(self.id.index, light_dim(self.depth, number))
     }
 
     /// A shadow ray to what was sampled of a light, and what it would bring; None if that is nothing.
@@ -281,9 +279,6 @@ impl<'a> Spot<'a> {
         }
     }
 }
-
-/// Depths between the sample dimensions of one light and the next: more than any chain is long.
-const LIGHT_STRIDE: u32 = 1 << 14;
 
 impl Whitted {
     /// One shadow ray to every light; and one ray drawn by the material, if lights have an extent.

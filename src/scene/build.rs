@@ -1,5 +1,5 @@
 //! From a description to a scene: groups are measured and recentred in double precision, shapes placed, and the kernel
-//! built while [`super::looks`] makes what is seen of them. Everything open goes through the families' registry tables.
+//! built while `scene::looks` makes what is seen of them. Everything open goes through the families' registry tables.
 
 use super::desc::{ObjectDesc, SceneDesc};
 use super::groups::{GroupPlan, PlannedGroup, PlannedShape, build_sources, plan_groups};

@@ -17,7 +17,6 @@ use crate::base::ray::Ray;
 use crate::base::shape::Dropped;
 use crate::base::space::RenderSpace;
 use crate::base::vertex::{Origin, Vertex, local_ray};
-use crate::color::Rgb;
 use desc::Background;
 use features::Features;
 use std::collections::HashMap;
@@ -117,15 +116,6 @@ impl Scene {
     }
 }
 
-/// What a path finds at its end, from one light.
-#[derive(Debug, Clone, Copy)]
-pub struct Emitted {
-    /// Radiance towards the path.
-    pub le: Rgb,
-    /// Density per solid angle with which light sampling would have found this end, choice of light included.
-    pub pdf: f32,
-}
-
 impl Lights {
     /// The light that a vertex lies on.
     #[inline]
@@ -133,19 +123,6 @@ impl Lights {
         // Most vertices lie on nothing that emits, and need not be looked for.
         let emits = self.emitting_objects.get(v.object as usize).is_some_and(|emits| *emits);
         if emits { self.by_path.get(&v.path).copied() } else { None }
-    }
-
-    /// What `light` sends along a path that ends at `end`, and the density of sampling it from `from`; None from
-    /// the camera or a delta lobe, for which light sampling could not have found it.
-    #[inline]
-    pub fn emitted(&self, light: u32, end: &PathEnd, from: Option<&Receiver>) -> Emitted {
-        let l = &self.list[light as usize];
-        let le = l.le(end);
-        let pdf = match from {
-            Some(r) if !le.is_black() => self.pdf(light, end, r),
-            _ => 0.0,
-        };
-        Emitted { le, pdf }
     }
 
     /// Density per solid angle with which light sampling from `from` finds `end` on `light`, choice of light included.

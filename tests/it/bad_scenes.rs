@@ -1,6 +1,6 @@
 //! Scenes that name what they should not: themselves, devices, what is not there.
 
-use skylit::formats::load;
+use skylit::formats::{load, load_mesh};
 use std::fs;
 use std::path::PathBuf;
 
@@ -54,6 +54,8 @@ fn devices_are_not_read() {
     for command in ["OBJ /dev/zero", "skybox /dev/zero", "texture /dev/zero\nsph 0 0 0 1"] {
         refused("a.scene", &format!("size 4 4\n{command}\nsph 0 0 0 1"), 3);
     }
+    assert_eq!(load("/dev/zero".as_ref()).map(drop).unwrap_err().exit_code(), 3);
+    assert_eq!(load_mesh("/dev/zero".as_ref()).map(drop).unwrap_err().exit_code(), 3);
     // A library's picture costs a warning.
     let dir = tempfile::tempdir().unwrap();
     fs::write(dir.path().join("a.mtl"), "newmtl a\nmap_Kd /dev/zero\n").unwrap();

@@ -38,7 +38,7 @@ pub fn integrator(kind: &str, params: &[(&str, f64)]) -> std::sync::Arc<dyn inte
     let mut p = Params::new();
     for (name, value) in params {
         let value = match *name {
-            "light_sampling" | "mis" => Value::Bool(*value != 0.0),
+            "light_sampling" | "mis" | "each_light" => Value::Bool(*value != 0.0),
             _ => Value::Number(*value),
         };
         p = p.with(name, value);
@@ -59,6 +59,7 @@ pub fn settings(scene: &Scene) -> RenderSettings {
 }
 
 /// Mean radiance over the whole film and its standard error, from the pixels' half-buffers.
+#[derive(Debug)]
 pub struct Mean {
     /// Mean luminance.
     pub value: f64,

@@ -8,6 +8,7 @@ mod common;
 mod convert;
 mod corpus;
 mod crosscheck;
+mod each_light;
 mod geometry;
 mod glass;
 mod kernels;
