@@ -1,9 +1,8 @@
 //! Scenes of a course on rendering (CSE 168 of the University of California, San Diego; `.test`): one command a line
 //! and a stack of transforms, from classic ray tracing to path tracing with multiple importance sampling.
 //!
-//! Pictures hold linear values, unless `gamma` says otherwise. Where the program sends shadow rays to every light, ours
-//! sends one to one of them, so samples are multiplied by the number of lights; `lightsamples` of an aliased picture are
-//! samples of the pixel's centre. Both are the same estimate from the same number of shadow rays.
+//! Pictures hold linear values, unless `gamma` says otherwise. Shadow rays go to every light (`each_light`), as they do
+//! there; `lightsamples` of an aliased picture are samples of the pixel's centre, the same estimate from as many rays.
 
 use super::commands::looks::{Look, Looks};
 use super::commands::soup::Soup;
@@ -188,7 +187,7 @@ impl<'a> Reader<'a> {
             }
             "lightsamples" => {
                 self.light_samples = s.integer(1, 1 << 20)? as u32;
-                self.lose(s, "samples of lights are samples of the pixel, as many for every light");
+                self.lose(s, "samples of lights are samples of the pixel");
             }
             "lightstratify" => {
                 if s.choice(&["on", "off"])? == "off" {
