@@ -3,20 +3,21 @@
 
 use crate::base::mesh::TriangleMesh;
 use crate::base::shape::ShapeSample;
-use crate::sampling::spherical::{RectangleFrame, SphericalRectangle};
+use crate::sampling::spherical::{Rectangle, SphericalRectangle};
 use glam::{DVec3, Vec2, Vec3};
 
 /// How far edges may be from perpendicular and opposite ones from parallel, relative to their length: some roundings of
 /// placed corners. Points of the rectangle that are not on the triangles are as rare.
 const TOLERANCE: f64 = 2e-6;
 
-/// Below this ratio of area to squared distance it is sampled by area: seen from so far it is as good as flat.
+/// Below this ratio of area to squared distance, a long side apart, it is sampled by area, as triangles of a mesh are
+/// (`shapes/mesh/sample.rs`): cosine and distance then vary over it by so little that solid angle gains nothing.
 const FLAT: f64 = 1e-4;
 
 /// The rectangle that both triangles of a mesh form.
 pub(super) struct RectangleLamp {
     /// Its normal is on the side that both triangles call outer.
-    frame: RectangleFrame,
+    frame: Rectangle,
     area: f64,
     two_sided: bool,
 }
@@ -41,7 +42,7 @@ impl RectangleLamp {
         let [x, y] = edges.map(DVec3::length);
         let open = (vertex(far) - a - edges[1]).length();
         let right = edges[0].dot(edges[1]).abs() <= TOLERANCE * x * y && open <= TOLERANCE * x.min(y);
-        let frame = RectangleFrame::new(corner, edges)?;
+        let frame = Rectangle::new(corner, edges)?;
         let lamp = RectangleLamp { frame, area: x * y, two_sided };
         right.then_some(lamp)
     }
@@ -53,7 +54,7 @@ impl RectangleLamp {
         if self.area < FLAT * d2 && x.max(y) * x.max(y) < 0.01 * d2 {
             return None;
         }
-        SphericalRectangle::of(from, &self.frame)
+        SphericalRectangle::new(from, &self.frame)
     }
 
     /// A point of it, uniform over the solid angle, or, where that is small, over the area. None where it is seen edge

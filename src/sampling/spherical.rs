@@ -89,30 +89,21 @@ pub struct SphericalRectangle {
     solid_angle: f64,
 }
 
-/// A rectangle: a corner and the two edges from it, which must be perpendicular.
+/// A rectangle, with what does not depend on where it is seen from.
 #[derive(Debug, Clone, Copy)]
 pub struct Rectangle {
-    /// A corner.
-    pub corner: Vec3,
-    /// The edges from it.
-    pub edges: [Vec3; 2],
-}
-
-/// A rectangle with unit vectors along its edges: what does not depend on where it is seen from.
-#[derive(Debug, Clone, Copy)]
-pub struct RectangleFrame {
     corner: DVec3,
     /// Along the edges, and across both.
     axes: [DVec3; 3],
     lengths: [f64; 2],
 }
 
-impl RectangleFrame {
-    /// None where the edges span nothing.
+impl Rectangle {
+    /// From a corner and the two edges from it, which must be perpendicular. None where they span nothing.
     pub fn new(corner: DVec3, edges: [DVec3; 2]) -> Option<Self> {
         let (x, y) = (edges[0].try_normalize()?, edges[1].try_normalize()?);
         let normal = x.cross(y).try_normalize()?;
-        Some(RectangleFrame { corner, axes: [x, y, normal], lengths: edges.map(DVec3::length) })
+        Some(Rectangle { corner, axes: [x, y, normal], lengths: edges.map(DVec3::length) })
     }
 
     /// A corner.
@@ -166,14 +157,8 @@ fn rectangle_solid_angle(x: [f64; 2], y: [f64; 2], z: f64) -> f64 {
 impl SphericalRectangle {
     /// The rectangle as seen from `p`. `None` if it fills less than [`SMALLEST_SOLID_ANGLE`], or if `p` lies in its
     /// plane, or anything is not finite.
-    pub fn new(p: Vec3, rectangle: &Rectangle) -> Option<Self> {
-        let edges = rectangle.edges.map(|e| e.as_dvec3());
-        Self::of(p.as_dvec3(), &RectangleFrame::new(rectangle.corner.as_dvec3(), edges)?)
-    }
-
-    /// As [`SphericalRectangle::new`].
-    pub fn of(p: DVec3, rectangle: &RectangleFrame) -> Option<Self> {
-        let RectangleFrame { corner, axes: [x_axis, y_axis, normal], lengths } = *rectangle;
+    pub fn new(p: DVec3, rectangle: &Rectangle) -> Option<Self> {
+        let Rectangle { corner, axes: [x_axis, y_axis, normal], lengths } = *rectangle;
         let d = corner - p;
         let z_axis = normal * d.dot(normal).signum();
         let (x0, y0, z) = (d.dot(x_axis), d.dot(y_axis), d.dot(z_axis));

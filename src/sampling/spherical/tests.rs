@@ -52,7 +52,9 @@ fn triangles_are_sampled_uniformly_and_invert() {
 }
 
 fn rectangles() -> Vec<(Vec3, Rectangle)> {
-    let rectangle = |corner, ex, ey| Rectangle { corner, edges: [ex, ey] };
+    let rectangle = |corner: Vec3, ex: Vec3, ey: Vec3| {
+        Rectangle::new(corner.as_dvec3(), [ex, ey].map(|e| e.as_dvec3())).expect("it spans something")
+    };
     let (x, y, z) = (Vec3::X, Vec3::Y, Vec3::Z);
     vec![
         // A face of the cube about the point: 2 pi / 3.
@@ -72,8 +74,9 @@ fn rectangles() -> Vec<(Vec3, Rectangle)> {
 fn rectangles_are_sampled_uniformly_and_invert() {
     let mut rng = TestRng::new(4);
     for (i, (p, r)) in rectangles().into_iter().enumerate() {
-        let s = SphericalRectangle::new(p, &r).unwrap();
-        let corners = [Vec3::ZERO, r.edges[0], r.edges[0] + r.edges[1], r.edges[1]].map(|e| r.corner + e);
+        let s = SphericalRectangle::new(p.as_dvec3(), &r).unwrap();
+        let [x, y] = r.edges();
+        let corners = [DVec3::ZERO, x, x + y, y].map(|e| (r.corner() + e).as_vec3());
         let halves = [[corners[0], corners[1], corners[2]], [corners[0], corners[2], corners[3]]];
         let area: f32 = halves.iter().map(|&v| SphericalTriangle::new(p, v).unwrap().solid_angle()).sum();
         assert!((s.solid_angle() / area - 1.0).abs() < 1e-5, "{i}: {} {area}", s.solid_angle());
@@ -95,7 +98,7 @@ fn rectangles_are_sampled_uniformly_and_invert() {
         chi_square_sphere(&format!("rectangle {i}"), &how, |rng| Some(s.sample(rng.vec2())), pdf);
     }
     let (p, r) = rectangles()[0];
-    let face = SphericalRectangle::new(p, &r).unwrap().solid_angle();
+    let face = SphericalRectangle::new(p.as_dvec3(), &r).unwrap().solid_angle();
     assert!((face - std::f32::consts::TAU / 3.0).abs() < 1e-6);
 }
 
@@ -106,11 +109,11 @@ fn tiny_and_broken_targets_are_refused() {
     assert!(SphericalTriangle::new(v[0], v).is_none());
     assert!(SphericalTriangle::new(Vec3::NAN, v).is_none());
     assert!(SphericalTriangle::new(Vec3::ZERO, [Vec3::X; 3]).is_none());
-    let r = Rectangle { corner: Vec3::ZERO, edges: [Vec3::X, Vec3::Y] };
-    assert!(SphericalRectangle::new(Vec3::new(0.5, 0.5, 0.0), &r).is_none());
-    assert!(SphericalRectangle::new(Vec3::new(0.0, 0.0, 1e6), &r).is_none());
-    assert!(SphericalRectangle::new(Vec3::INFINITY, &r).is_none());
-    assert!(SphericalRectangle::new(Vec3::Z, &Rectangle { edges: [Vec3::ZERO, Vec3::Y], ..r }).is_none());
+    let r = Rectangle::new(DVec3::ZERO, [DVec3::X, DVec3::Y]).unwrap();
+    assert!(SphericalRectangle::new(DVec3::new(0.5, 0.5, 0.0), &r).is_none());
+    assert!(SphericalRectangle::new(DVec3::new(0.0, 0.0, 1e6), &r).is_none());
+    assert!(SphericalRectangle::new(DVec3::INFINITY, &r).is_none());
+    assert!(Rectangle::new(DVec3::ZERO, [DVec3::ZERO, DVec3::Y]).is_none());
     // Every corner of the square gives a unit vector.
     for (p, v) in triangles() {
         let t = SphericalTriangle::new(p, v).unwrap();
@@ -121,7 +124,7 @@ fn tiny_and_broken_targets_are_refused() {
         }
     }
     for (p, r) in rectangles() {
-        let s = SphericalRectangle::new(p, &r).unwrap();
+        let s = SphericalRectangle::new(p.as_dvec3(), &r).unwrap();
         for u in [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0], [1.0, 0.0], [0.5, 0.0], [1e-30, 1e-30]] {
             assert!((s.sample(Vec2::from_array(u)).length() - 1.0).abs() < 1e-6);
         }
