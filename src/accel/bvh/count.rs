@@ -20,7 +20,7 @@ impl Counter for () {
 }
 
 /// Counting has no hurry, and each set of instructions is another copy of the walk to compile. (Boxes are culled by the
-/// same bounds whatever the instructions; a few in a million differ by a rounding.)
+/// same bounds whatever the instructions, so that counts differ by roundings alone.)
 impl Counter for Visits {
     fn enter<J: Job>(_level: Available, job: J) -> J::Output {
         job.run::<Portable>()
