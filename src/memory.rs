@@ -26,7 +26,7 @@ pub fn is_limited() -> bool {
 }
 
 /// Room for bytes that are about to be written. While it is held they count as used, wherever others ask; once they
-/// are written they count by themselves, and it is to be dropped.
+/// are written they count by themselves, and it is to be dropped: what is half written counts up to twice.
 #[derive(Debug)]
 #[must_use = "room that is given back at once is no room"]
 pub struct Room(u64);
@@ -61,9 +61,11 @@ pub fn room(bytes: u64, what: impl FnOnce() -> String) -> Result<Room> {
     )))
 }
 
-/// Whether `bytes` more would stay within the limit; for callers that cannot hold a [`Room`].
+/// Whether `bytes` more than what is in use stay within the limit; for allocations made under a [`Room`] that is held for
+/// all of them, so that promises do not count.
 pub fn fits(bytes: u64) -> bool {
-    room(bytes, String::new).is_ok()
+    let limit = LIMIT.load(Ordering::Relaxed);
+    limit == UNLIMITED || in_use().unwrap_or(0).saturating_add(bytes) <= limit
 }
 
 /// Bytes of memory that this process has in use, as Linux tells it.

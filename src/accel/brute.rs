@@ -14,6 +14,7 @@ use std::sync::Arc;
 pub const ROW: KernelRow = KernelRow {
     name: "brute",
     doc: "the oracle: tests every primitive in double precision",
+    build_bytes: 0,
     build: |geometry, _: &KernelOptions| Ok(Box::new(Brute::new(geometry)) as Box<dyn Intersectable>),
 };
 

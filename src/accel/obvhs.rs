@@ -28,6 +28,7 @@ use std::time::Duration;
 pub const ROW: KernelRow = KernelRow {
     name: "obvhs",
     doc: "the obvhs library's own traversal, as a baseline",
+    build_bytes: 260,
     build: |geometry, options| Ok(Box::new(Kernel::new(geometry, options)?) as Box<dyn Intersectable>),
 };
 

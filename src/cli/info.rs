@@ -3,7 +3,6 @@
 use super::scene_args::SceneArgs;
 use super::summary::count;
 use super::{Setting, print};
-use crate::accel::BYTES_PER_PRIMITIVE;
 use crate::base::mesh_data::MeshData;
 use crate::base::registry::{Node, Value};
 use crate::error::{Error, Result};
@@ -88,6 +87,9 @@ struct Info {
     memory: Cost,
 }
 
+/// What the in-house and Embree's tree hold, leaves with their triangles included, as measured on 3,000,000 triangles (62
+/// and 69).
+const KERNEL_BYTES_PER_PRIMITIVE: u64 = 70;
 /// Objects that the text lists; JSON has them all.
 const MAX_LISTED: usize = 50;
 
@@ -155,7 +157,7 @@ impl Info {
         let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
         self.memory = Cost {
             geometry: report.geometry_bytes,
-            kernel_estimate: (report.triangles + report.procedurals) * BYTES_PER_PRIMITIVE,
+            kernel_estimate: (report.triangles + report.procedurals) * KERNEL_BYTES_PER_PRIMITIVE,
             film_estimate: pixels * BYTES_PER_PIXEL,
         };
     }

@@ -122,7 +122,7 @@ pub fn read(path: &Path, mut source: Source) -> Result<MeshData> {
     let header = header::parse(path, &bytes, size)?;
     let body = header.body;
     let plan = plan(path, header)?;
-    let _room = memory::room(plan.bytes(), || format!("{}: the mesh", path.display()))?;
+    let room = memory::room(plan.bytes(), || format!("{}: the mesh", path.display()))?;
     let tables = match plan.format {
         Format::Ascii => {
             source.read_rest(&mut bytes)?;
@@ -132,6 +132,7 @@ pub fn read(path: &Path, mut source: Source) -> Result<MeshData> {
             binary::read(&plan, Stream::new(path, source, bytes, body, size))?
         }
     };
+    drop(room);
     assemble(&plan, tables)
 }
 

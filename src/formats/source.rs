@@ -144,11 +144,12 @@ impl<'a> Source<'a> {
     /// # Errors
     /// Those of [`Source::fill`]; [`Error::File`] for a file that does not fit in memory.
     pub fn read_rest(&mut self, bytes: &mut Vec<u8>) -> Result<()> {
+        let mut room = None;
         if let Some(size) = self.size {
             // A size that memory cannot hold is an error here and not an abort further on. The byte more spares the
             // vector a doubling when it looks for the end.
             let left = size.saturating_add(1).saturating_sub(bytes.len() as u64);
-            let _room = memory::room(left, || self.path.display().to_string())?;
+            room = Some(memory::room(left, || self.path.display().to_string())?);
             bytes.try_reserve_exact(usize::try_from(left).unwrap_or(usize::MAX)).map_err(|_| {
                 Error::file(self.path, "read", format!("its {} MiB do not fit in memory", size >> 20))
             })?;
@@ -161,6 +162,7 @@ impl<'a> Source<'a> {
                 drop(memory::room(bytes.len().max(PIECE) as u64, what)?);
             }
             if self.fill(bytes, more)? < more {
+                drop(room);
                 return Ok(());
             }
         }

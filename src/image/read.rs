@@ -49,9 +49,12 @@ pub fn read_image(path: &Path, encoding: Option<Encoding>) -> Result<ImageData> 
 /// All bytes of a picture's file.
 ///
 /// # Errors
-/// A file that cannot be opened or read.
+/// A file that cannot be opened or read, or that is larger than the memory that may be used.
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>> {
-    std::fs::read(path).map_err(|e| Error::file(path, "open", e))
+    let fail = |e| Error::file(path, "open", e);
+    let length = std::fs::metadata(path).map_err(fail)?.len();
+    let _room = memory::room(length, || path.display().to_string())?;
+    std::fs::read(path).map_err(fail)
 }
 
 /// Whether a file begins as a picture does; nothing else of it is read.
@@ -70,12 +73,13 @@ pub fn check_kind(path: &Path) -> Result<()> {
 /// # Errors
 /// As [`read_image`], but for damage after the header.
 pub fn dimensions(path: &Path, bytes: &[u8]) -> Result<(usize, usize)> {
-    match sniff(path, bytes)? {
+    let format = sniff(path, bytes)?;
+    guarded(path, || match format {
         Format::Png => image_decoder(path, bytes, ImageFormat::Png).map(|d| size_of(&d)),
         Format::Jpeg => image_decoder(path, bytes, ImageFormat::Jpeg).map(|d| size_of(&d)),
         Format::Hdr => hdr::dimensions(path, bytes),
         Format::Exr => exr_read::dimensions(path, bytes),
-    }
+    })
 }
 
 /// As [`read_image`], from the bytes of a file; `path` is for messages alone.

@@ -50,6 +50,7 @@ use walk::{Search, Stack, Stop, walk};
 pub const ROW: KernelRow = KernelRow {
     name: "bvh",
     doc: "in-house: strictly watertight, decides in double precision",
+    build_bytes: 125,
     build: |geometry, options| Ok(Box::new(Kernel::new(geometry, options)?) as Box<dyn Intersectable>),
 };
 

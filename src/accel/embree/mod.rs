@@ -37,6 +37,7 @@ use std::sync::Arc;
 pub const ROW: KernelRow = KernelRow {
     name: "embree",
     doc: "Intel Embree",
+    build_bytes: 105,
     build: |geometry, options| Ok(Box::new(Kernel::new(geometry, options)?) as Box<dyn Intersectable>),
 };
 
