@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Renders one mesh under one equirectangular sky with Mitsuba 3, for comparison with skylit.
 
-    pip install mitsuba numpy
+    pip install mitsuba numpy OpenEXR
     python3 benches/peers/mitsuba_render.py MESH.ply SKY.exr -o out.exr [options]
 
 SKY.exr is equirectangular in skylit's convention (the middle column looks along +x); skylit writes such a picture of
@@ -20,6 +20,8 @@ import subprocess
 import time
 
 import numpy as np
+
+from peer_mitsuba import diffuse, direct, envmap, metal, path, sensor
 
 
 def arguments():
@@ -49,30 +51,15 @@ def arguments():
 
 
 def integrator(a):
-    if a.integrator == "direct":
-        return {"type": "direct", "emitter_samples": 1, "bsdf_samples": 1}
-    if a.integrator == "direct-bsdf":
-        return {"type": "direct", "emitter_samples": 0, "bsdf_samples": 1}
     if a.integrator == "depth":
         return {"type": "depth"}
-    # Mitsuba counts path edges: depth 2 is direct light.
-    return {"type": "path", "max_depth": a.max_depth + 1, "rr_depth": 1000}
-
-
-def material(a):
-    if a.metal_roughness is not None:
-        return {
-            "type": "roughconductor",
-            "material": "none",
-            "distribution": "ggx",
-            "alpha": a.metal_roughness**2,
-        }
-    return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [a.albedo] * 3}}}
+    return path(a.max_depth) if a.integrator == "path" else direct(bsdf_only=a.integrator == "direct-bsdf")
 
 
 def scene(mi, a):
     T = mi.ScalarTransform4f
-    mesh = {"type": "obj" if a.mesh.lower().endswith(".obj") else "ply", "filename": a.mesh, "bsdf": material(a)}
+    bsdf = diffuse(a.albedo) if a.metal_roughness is None else metal(a.metal_roughness)
+    mesh = {"type": "obj" if a.mesh.lower().endswith(".obj") else "ply", "filename": a.mesh, "bsdf": bsdf}
     if a.fit:
         box = mi.load_dict({**mesh, "face_normals": True}).bbox()
         size = max(box.max[i] - box.min[i] for i in range(3))
@@ -80,30 +67,16 @@ def scene(mi, a):
             T().rotate([0, 1, 0], a.rotate_y) @ T().scale(a.fit / size) @ T().translate([-c for c in box.center()])
         )
     sky = np.array(mi.Bitmap(a.sky).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
-    # Mitsuba's middle column looks along +z, a quarter of the width from ours.
-    sky = np.roll(sky, -(sky.shape[1] // 4), axis=1)
-    width, height = map(int, a.size.split("x"))
+    size = list(map(int, a.size.split("x")))
     vector = lambda s: [float(x) for x in s.split(",")]
+    camera = {"eye": vector(a.eye), "look_at": vector(a.look_at), "up": [0, 1, 0], "fov_deg": a.fov}
+    sampler = {"type": a.sampler, "sample_count": a.spp}
     return {
         "type": "scene",
         "integrator": integrator(a),
         "mesh": mesh,
-        "sky": {"type": "envmap", "bitmap": mi.Bitmap(np.ascontiguousarray(sky))},
-        "sensor": {
-            "type": "perspective",
-            "fov": a.fov,
-            "fov_axis": "y",
-            "to_world": T().look_at(origin=vector(a.eye), target=vector(a.look_at), up=[0, 1, 0]),
-            "film": {
-                "type": "hdrfilm",
-                "width": width,
-                "height": height,
-                "rfilter": {"type": a.rfilter},
-                "pixel_format": "rgb",
-                "component_format": "float32",
-            },
-            "sampler": {"type": a.sampler, "sample_count": a.spp},
-        },
+        "sky": envmap(mi, sky),
+        "sensor": sensor(mi, camera, size, sampler, a.rfilter),
     }
 
 

@@ -1,12 +1,15 @@
-//! `skylit bench`: measurements. `rays` asks how fast every kernel answers the same rays, and whether all answer alike.
+//! `skylit bench`: measurements. `rays` asks how fast every kernel answers the same rays, and whether all answer alike;
+//! for `error` see [`super::bench_error`].
 
 use super::args::amount;
+use super::bench_error::ErrorArgs;
 use super::scene_args::SceneArgs;
 use super::{Setting, interrupt, print};
 use crate::base::intersectable::{BuildQuality, KernelMode};
+use crate::bench::Progress;
 use crate::bench::rays::growth::{Growth, default_sky, grow};
 use crate::bench::rays::kernels::Choice;
-use crate::bench::rays::measure::{Bench, Progress, Setup, measure};
+use crate::bench::rays::measure::{Bench, Setup, measure};
 use crate::bench::rays::peer::{Peer, serve};
 use crate::bench::rays::record::{Record, to_json};
 use crate::bench::rays::sets::{RaySets, SceneKey, check_scene, oracle};
@@ -40,6 +43,12 @@ enum What {
         displaced-sphere or terrain."
     )]
     Rays(Box<RaysArgs>),
+    /// Render again and again with settings of your choice: error against time, bias, speed-up at equal error
+    #[command(
+        after_help = "Errors are measured against a reference of many times the samples, whose own noise is taken off. \
+        Runs of all settings alternate; seconds are those of rendering alone. Every run has a seed of its own."
+    )]
+    Error(Box<ErrorArgs>),
     /// The other side of --peer: answers requests on stdin
     #[command(hide = true)]
     RaysWorker(Box<RaysArgs>),
@@ -146,6 +155,7 @@ pub fn run(args: &BenchArgs, setting: &Setting) -> Result<()> {
         What::Rays(a) if a.triangles.is_empty() => a.rays(setting),
         What::Rays(a) => a.grow(setting),
         What::RaysWorker(a) => a.work(setting),
+        What::Error(a) => a.run(setting),
     }
 }
 
@@ -351,11 +361,11 @@ fn judge(c: &Comparison) -> Result<()> {
 }
 
 /// What is being done, and how much is left.
-struct BenchBar(ProgressBar);
+pub(super) struct BenchBar(ProgressBar);
 
 impl BenchBar {
     /// Nothing is drawn if quiet, or where stderr is no terminal.
-    fn new(setting: &Setting) -> Self {
+    pub(super) fn new(setting: &Setting) -> Self {
         if setting.quiet {
             return BenchBar::hidden();
         }
@@ -370,7 +380,7 @@ impl BenchBar {
         BenchBar(ProgressBar::hidden())
     }
 
-    fn finish(&self) {
+    pub(super) fn finish(&self) {
         self.0.finish_and_clear();
     }
 }

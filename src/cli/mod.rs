@@ -2,6 +2,7 @@
 
 mod args;
 mod bench;
+mod bench_error;
 mod check;
 mod convert;
 mod crosscheck;
@@ -76,7 +77,7 @@ enum Verb {
     Render(Box<render::RenderArgs>),
     /// Say what is in a scene or a mesh, what it needs and what it will cost
     Info(Box<info::InfoArgs>),
-    /// Measure: how fast every kernel answers the same rays
+    /// Measure: how fast kernels answer the same rays, how fast renders come near the truth
     Bench(Box<bench::BenchArgs>),
     /// Send every ray of a render through every kernel, judge the differences, and compare the pictures
     Crosscheck(Box<crosscheck::CrosscheckArgs>),

@@ -179,20 +179,17 @@ impl RenderArgs {
 impl SamplingArgs {
     /// The command line's word counts more than the scene's.
     fn settings(&self, scene: &SceneDesc, plan: &Plan, threads: usize) -> Result<RenderSettings> {
-        let usual = RenderSettings::new(scene.film.size);
-        let given = &scene.render;
+        let usual = RenderSettings::of_scene(scene)?;
         let crop = self.cropwindow.map(|CropWindow(w)| crop_window(w, usual.size)).transpose()?;
-        let scene_sampler = given.sampler.as_deref().map(str::parse).transpose()?;
-        let scene_filter = given.filter.as_deref().map(str::parse).transpose()?;
         // With a time limit the clock rules, unless the command line says otherwise.
-        let usual_spp = if self.time.is_some() { u32::MAX } else { given.spp.unwrap_or(usual.spp) };
+        let usual_spp = if self.time.is_some() { u32::MAX } else { usual.spp };
         Ok(RenderSettings {
             crop: crop.unwrap_or(usual.crop),
             spp: self.spp.unwrap_or(usual_spp),
             time: self.time,
-            seed: self.seed.or(given.seed).unwrap_or(usual.seed),
-            sampler: plan.sampler.or(scene_sampler).unwrap_or(usual.sampler),
-            filter: plan.filter.or(scene_filter).unwrap_or(usual.filter),
+            seed: self.seed.unwrap_or(usual.seed),
+            sampler: plan.sampler.unwrap_or(usual.sampler),
+            filter: plan.filter.unwrap_or(usual.filter),
             threads,
             aovs: plan.output.aovs.clone(),
             ..usual

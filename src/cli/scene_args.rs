@@ -18,7 +18,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 /// What is rendered.
-#[derive(Args)]
+#[derive(Debug, Clone, Args)]
 pub struct SceneArgs {
     /// Scene file (.toml, .scene, .test), or a mesh alone (.obj or .ply, also packed as .gz or .zst)
     #[arg(value_name = "SCENE|MESH")]
@@ -38,7 +38,7 @@ pub struct SceneArgs {
     background: Option<Background>,
 }
 
-#[derive(Args)]
+#[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Sky")]
 struct SkyArgs {
     /// The sky: a kind without parameters (see `skylit list sky`), a picture, or a folder of six faces
@@ -58,7 +58,7 @@ struct SkyArgs {
     sky_sampling: Option<String>,
 }
 
-#[derive(Args)]
+#[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Mesh alone")]
 struct MeshArgs {
     /// From where it is seen: degrees about the upright axis and above the horizon [default: 30,15]

@@ -3,8 +3,8 @@
 use super::compare::Style;
 use super::summary::{Line, Summary};
 use super::{Crosscheck, Difference};
-use crate::color::{Rgb, linear_to_srgb};
-use crate::error::{Error, Result};
+use crate::color::Rgb;
+use crate::error::Result;
 use crate::image::tonemap::Look;
 use crate::render::film::Film;
 use crate::report::machine::Machine;
@@ -98,8 +98,7 @@ fn pictures(check: &Crosscheck) -> Result<Section> {
     let mut section = Section::new("Pictures");
     let Some(first) = p.films.first() else { return Ok(section) };
     for (name, film) in check.names.iter().zip(&p.films) {
-        let colors = colors(film).map(|c| Look::default().apply(c));
-        section = section.with(picture(film, colors, name.clone())?);
+        section = section.with(Picture::of_film(film, name.clone())?);
     }
     for (d, film) in p.against_first.iter().zip(p.films.iter().skip(1)) {
         let names = format!("{} - {}", d.name, check.names[0]);
@@ -154,19 +153,9 @@ fn places(check: &Crosscheck, film: &Film) -> Result<Picture> {
     picture(film, colors.into_iter(), text.into())
 }
 
-/// Display-linear colours as PNG.
+/// Display-linear colours of a film's pixels.
 fn picture(film: &Film, colors: impl Iterator<Item = Rgb>, caption: String) -> Result<Picture> {
-    let byte = |v: f32| (linear_to_srgb(v.clamp(0.0, 1.0)) * 255.0).round() as u8;
-    let bytes: Vec<u8> = colors.flat_map(|c| [c.r, c.g, c.b].map(byte)).collect();
-    let fail = |e: png::EncodingError| Error::Internal(format!("cannot write a picture: {e}"));
-    let mut file = Vec::new();
-    let mut encoder = png::Encoder::new(&mut file, film.window().width(), film.window().height());
-    encoder.set_color(png::ColorType::Rgb);
-    encoder.set_depth(png::BitDepth::Eight);
-    let mut writer = encoder.write_header().map_err(fail)?;
-    writer.write_image_data(&bytes).map_err(fail)?;
-    writer.finish().map_err(fail)?;
-    Ok(Picture { png: file, caption, pixelated: true })
+    Picture::of_colors([film.window().width(), film.window().height()], colors, caption)
 }
 
 fn differences(s: &Summary) -> Section {

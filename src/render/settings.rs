@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::render::aov::AovRow;
 use crate::sampler::Sampler;
 use crate::sampling::filter::PixelFilter;
+use crate::scene::desc::SceneDesc;
 use std::time::Duration;
 
 /// Settings of a render. Two renders with the same scene and settings give the same bits, whatever the threads.
@@ -62,6 +63,21 @@ impl RenderSettings {
             threads: std::thread::available_parallelism().map_or(1, |n| n.get()),
             aovs: Vec::new(),
         }
+    }
+
+    /// What a scene asks for, and the defaults for the rest.
+    ///
+    /// # Errors
+    /// Names of samplers and filters that nothing has.
+    pub fn of_scene(scene: &SceneDesc) -> Result<Self> {
+        let (usual, given) = (RenderSettings::new(scene.film.size), &scene.render);
+        Ok(RenderSettings {
+            spp: given.spp.unwrap_or(usual.spp),
+            seed: given.seed.unwrap_or(usual.seed),
+            sampler: given.sampler.as_deref().map(str::parse).transpose()?.unwrap_or(usual.sampler),
+            filter: given.filter.as_deref().map(str::parse).transpose()?.unwrap_or(usual.filter),
+            ..usual
+        })
     }
 
     /// Checks what the types cannot.

@@ -1,6 +1,7 @@
 //! Curves over linear or logarithmic axes.
 
 use super::bars::{COLORS, rounded};
+use crate::error::{Error, Result};
 use serde::Serialize;
 
 /// A chart of curves.
@@ -167,7 +168,53 @@ pub fn short(v: f64) -> String {
     }
 }
 
+/// Colours of curves where no style sheet gives any: those of the pages in light.
+const PALETTE: [&str; COLORS] =
+    ["#2f6db5", "#e08a1e", "#2a9d78", "#b34b8e", "#6f5bd0", "#8a6d3b", "#d4533f", "#6b7684"];
+
+/// Room for the caption above the chart.
+const CAPTION: f64 = 26.0;
+/// Room for a line of the legend below.
+const LEGEND: f64 = 18.0;
+
+#[derive(Serialize)]
+struct Standing<'a> {
+    caption: &'a str,
+    x: &'a str,
+    y: &'a str,
+    top: f64,
+    legend_at: f64,
+    height: f64,
+    colors: [&'a str; COLORS],
+    drawn: Drawn<'a>,
+}
+
 impl Lines {
+    /// The chart as a picture of its own, with caption and legend.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] if the template fails, which is a fault of ours.
+    pub fn to_svg(&self) -> Result<String> {
+        let legend_at = CAPTION + SIZE[1] + 8.0;
+        let content = Standing {
+            caption: &self.caption,
+            x: &self.x.label,
+            y: &self.y.label,
+            top: CAPTION,
+            legend_at,
+            height: legend_at + LEGEND * self.series.len() as f64,
+            colors: PALETTE,
+            drawn: self.drawn(),
+        };
+        let fail = |e: minijinja::Error| Error::Internal(format!("cannot write the chart: {e:#}"));
+        let mut environment = minijinja::Environment::new();
+        // SVG wants the escapes that HTML does.
+        environment.set_auto_escape_callback(|_| minijinja::AutoEscape::Html);
+        environment.add_template("lines.svg", include_str!("lines.svg")).map_err(fail)?;
+        let template = environment.get_template("lines.svg").map_err(fail)?;
+        template.render(minijinja::value::Serde(&content)).map_err(fail)
+    }
+
     pub(super) fn drawn(&self) -> Drawn<'_> {
         let fits = |axis: &Axis, v: f64| v.is_finite() && (!axis.log || v > 0.0);
         let visible = |l: &Line| -> Vec<[f64; 2]> {

@@ -16,6 +16,7 @@
 pub mod bars;
 pub mod lines;
 pub mod machine;
+mod picture;
 pub mod table;
 #[cfg(test)]
 mod tests;

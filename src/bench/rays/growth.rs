@@ -1,10 +1,11 @@
 //! How build time, memory and speed grow with the number of triangles: the same shape, generated in several sizes.
 
 use super::kernels::Choice;
-use super::measure::{Bench, Progress, Setup, measure};
+use super::measure::{Bench, Setup, measure};
 use super::record::Record;
 use super::sets::{RaySets, check_scene};
 use crate::base::registry::{Node, Params, Value};
+use crate::bench::Progress;
 use crate::error::{Error, Result, unknown_name};
 use crate::formats::families::Families;
 use crate::scene::build::{BuildOptions, build};

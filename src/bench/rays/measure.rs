@@ -11,25 +11,12 @@ use super::peer::{Peer, PeerRow};
 use super::record::{Cell, KIND, Record, Row, SceneInfo, VERSION, VisitInfo, WorkloadInfo, row_key};
 use super::sets::{RaySets, WORKLOADS, Workload, count, placed_primitives};
 use crate::base::ray::RayBatch;
+use crate::bench::Progress;
 use crate::error::{Error, Result};
 use crate::report::machine::Machine;
 use crate::scene::Scene;
 use rayon::prelude::*;
 use std::time::Instant;
-
-/// Told how far a measurement is.
-pub trait Progress {
-    /// So many steps will come.
-    fn begin(&self, _steps: u64) {}
-
-    /// A step begins.
-    fn step(&self, _what: &str) {}
-}
-
-/// No progress is shown.
-pub struct Silent;
-
-impl Progress for Silent {}
 
 /// What is measured, and how.
 pub struct Setup<'a> {

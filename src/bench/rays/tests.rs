@@ -5,7 +5,7 @@ use super::file::{from_bytes, to_bytes};
 use super::forms::{Answers, FORMS};
 use super::growth::scene_of;
 use super::kernels::{Built, Choice, KernelInfo};
-use super::measure::{Bench, Setup, Silent, measure};
+use super::measure::{Bench, Setup, measure};
 use super::peer::serve;
 use super::present;
 use super::record::{Cell, Differences, KIND, Record, Row, SceneInfo, VERSION, WorkloadInfo, median};
@@ -15,6 +15,7 @@ use super::sets::{
 use super::verdict::{Judgement, compare};
 use crate::base::intersectable::{BuildQuality, KernelMode};
 use crate::base::ray::{Coherence, Ray, RayBatch};
+use crate::bench::Silent;
 use crate::report::machine::Machine;
 use crate::scene::Scene;
 use crate::scene::build::{BuildOptions, build};
