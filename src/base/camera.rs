@@ -3,6 +3,7 @@
 use crate::base::ray::RayBatch;
 use crate::base::space::RenderSpace;
 use crate::error::Result;
+use glam::DVec3;
 use std::sync::Arc;
 
 /// A batch of film samples, as columns of one length.
@@ -18,6 +19,36 @@ pub struct FilmSamples<'a> {
     pub lens_v: &'a [f32],
 }
 
+/// A camera whose rays all start in one point and meet its film as a plane: where on the film a point is seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Projection {
+    /// Where all rays start, in render space.
+    pub eye: DVec3,
+    /// Unit direction of sight.
+    pub forward: DVec3,
+    /// Change of the direction by a pixel to the right and down, where its part along `forward` is 1; at right angles to
+    /// each other and to `forward`.
+    pub steps: [DVec3; 2],
+    /// Middle of the film, pixels.
+    pub middle: [f64; 2],
+}
+
+impl Projection {
+    /// Distance of a point from the plane through the eye, positive in front.
+    #[inline]
+    pub fn depth(&self, p: DVec3) -> f64 {
+        (p - self.eye).dot(self.forward)
+    }
+
+    /// Where the line through a point in front of the camera meets the film, in pixels from its left top.
+    #[inline]
+    pub fn film(&self, p: DVec3) -> [f64; 2] {
+        let v = p - self.eye;
+        let depth = v.dot(self.forward);
+        [0, 1].map(|a| self.middle[a] + v.dot(self.steps[a]) / (depth * self.steps[a].length_squared()))
+    }
+}
+
 /// A camera in render space.
 pub trait Camera: Send + Sync {
     /// Fills origins, directions (of unit length) and extents of `rays`, resized to the batch; keys are not set.
@@ -26,6 +57,11 @@ pub trait Camera: Send + Sync {
     /// Whether lens points are read at all.
     fn has_lens(&self) -> bool {
         false
+    }
+
+    /// Where points are seen; None if rays start in more than one point, or do not meet a plane.
+    fn projection(&self) -> Option<Projection> {
+        None
     }
 
     /// The width of a pixel's ray at distance 1 (radians, near enough), for texture footprints.

@@ -1,6 +1,7 @@
 //! Where light comes from. A sky is a light like any other; a path that leaves the scene has met it.
 
 use crate::base::directions::Directions;
+use crate::base::material::Scattering;
 use crate::base::space::RenderSpace;
 use crate::base::vertex::Vertex;
 use crate::color::Rgb;
@@ -44,6 +45,48 @@ pub struct PathEnd<'a> {
     pub wi: Vec3,
     /// The surface, if there is one.
     pub vertex: Option<&'a Vertex>,
+}
+
+/// What a light may know of the surface when it chooses a direction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lobes {
+    /// Unit direction to the viewer.
+    pub wo: Vec3,
+    /// About the receiver's shading normal.
+    pub scattering: Scattering,
+}
+
+/// What a guided light has worked out for one receiver; room that is kept from one to the next.
+#[derive(Debug, Clone, Default)]
+pub struct Guide {
+    /// Of the light's parts.
+    pub weights: Vec<f32>,
+    /// Running sums over rows of them.
+    pub sums: Vec<f64>,
+}
+
+impl Guide {
+    /// Sum of all weights.
+    #[inline(always)]
+    pub fn total(&self) -> f64 {
+        self.sums.last().copied().unwrap_or(0.0)
+    }
+}
+
+/// A light at infinity that chooses directions by what it brings times what the surface makes of it. For each receiver
+/// first [`GuidedLight::prepare`], then any of the others with the same guide.
+pub trait GuidedLight: Send + Sync {
+    /// Works out what is needed for a receiver; false if no sample can be drawn.
+    fn prepare(&self, at: &Receiver, lobes: &Lobes, guide: &mut Guide) -> bool;
+
+    /// As [`Light::sample_li`].
+    fn sample(&self, at: &Receiver, guide: &Guide, u: [f32; 2]) -> Option<LightSample>;
+
+    /// As [`Light::pdf_li`], of the direction `wi`.
+    fn pdf(&self, at: &Receiver, guide: &Guide, wi: Vec3) -> f32;
+
+    /// Largest radiance over the mean over all directions: how much a direction that is never looked at may hide.
+    fn contrast(&self) -> f32;
 }
 
 /// A bounding sphere of what is lit, in render space.
@@ -100,6 +143,11 @@ pub trait Light: Send + Sync {
     /// Whether it shines from one point or direction alone, which no path meets by chance; its samples are all the same.
     fn is_delta(&self) -> bool {
         false
+    }
+
+    /// This light as one that takes the surface into account; None if it does not.
+    fn guided(&self) -> Option<&dyn GuidedLight> {
+        None
     }
 
     /// Whether paths that leave the scene end on this light.

@@ -45,6 +45,23 @@ pub struct BsdfSample {
     pub delta: bool,
 }
 
+/// How a surface scatters, as far as a light is told of it when it chooses a direction: an even part, and facets about
+/// the shading normal. It guides sampling, and may be wrong by any factor at the cost of variance alone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scattering {
+    /// f of the part that scatters evenly, per steradian.
+    pub even: f32,
+    /// Reflectance of the facets; 0 where there are none.
+    pub facets: f32,
+    /// Width of the facets' distribution (GGX alpha).
+    pub alpha: f32,
+}
+
+impl Scattering {
+    /// Evenly, as far as anybody knows.
+    pub const EVEN: Scattering = Scattering { even: 1.0, facets: 0.0, alpha: 1.0 };
+}
+
 /// Value and density of a pair of directions.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct BsdfEval {
@@ -79,6 +96,11 @@ pub trait Material: Send + Sync {
     /// Reflectance for light from everywhere, seen from `wo`: an estimate good to some percent, for AOVs and
     /// decisions, not for radiometry.
     fn albedo(&self, m: &Prepared, wo: Vec3) -> Rgb;
+
+    /// What lights may know of it.
+    fn scattering(&self, _m: &Prepared) -> Scattering {
+        Scattering::EVEN
+    }
 
     /// Reflectance of the part that scatters evenly (Lambert), for closed forms; black where there is none.
     fn diffuse(&self, _m: &Prepared) -> Rgb {

@@ -1,6 +1,6 @@
 //! A pinhole or thin-lens camera.
 
-use crate::base::camera::{Camera, CameraSource, FilmSamples, FilmSize};
+use crate::base::camera::{Camera, CameraSource, FilmSamples, FilmSize, Projection};
 use crate::base::ray::{MAX_COORDINATE, RayBatch};
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::base::space::RenderSpace;
@@ -183,6 +183,13 @@ impl Camera for Perspective {
 
     fn has_lens(&self) -> bool {
         self.lens.is_some()
+    }
+
+    fn projection(&self) -> Option<Projection> {
+        // Of what rays are made of: rounded to f32.
+        let [eye, forward, dx, dy] = [self.eye, self.forward, self.dx, self.dy].map(Vec3::as_dvec3);
+        let middle = self.middle.to_array().map(f64::from);
+        self.lens.is_none().then_some(Projection { eye, forward, steps: [dx, dy], middle })
     }
 
     fn pixel_spread(&self) -> f32 {

@@ -61,6 +61,10 @@ struct SamplingArgs {
     /// Pixel filter [default: blackman-harris]
     #[arg(long, value_name = "NAME")]
     filter: Option<String>,
+    /// Pixels that see no geometry: their filter's integral of the sky where that is known to a thousandth, or samples as
+    /// everywhere [default: integrate]
+    #[arg(long, value_name = "integrate|sample")]
+    sky_pixels: Option<SkyPixels>,
     /// Seed of every random choice [default: 0]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -96,6 +100,12 @@ impl From<ModeArg> for KernelMode {
             ModeArg::Fast => KernelMode::Fast,
         }
     }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum SkyPixels {
+    Integrate,
+    Sample,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -190,6 +200,7 @@ impl SamplingArgs {
             seed: self.seed.unwrap_or(usual.seed),
             sampler: plan.sampler.unwrap_or(usual.sampler),
             filter: plan.filter.unwrap_or(usual.filter),
+            skip_background: self.sky_pixels != Some(SkyPixels::Sample),
             threads,
             aovs: plan.output.aovs.clone(),
             ..usual

@@ -70,6 +70,13 @@ struct Memory {
     peak: Option<u64>,
 }
 
+/// What needed no ray.
+#[derive(Debug, Clone, Serialize)]
+struct Skipped {
+    pixels: u64,
+    samples: u64,
+}
+
 /// A sample that was not finite, to be traced again.
 #[derive(Debug, Clone, Serialize)]
 struct Dropped {
@@ -95,8 +102,12 @@ pub struct Record {
     /// Filled in stage by stage.
     pub seconds: Seconds,
     samples: u64,
+    /// Pixels that no geometry projects into, and their samples that needed no ray.
+    skipped: Skipped,
     msamples_per_second: f64,
     rays: Rays,
+    /// What the integrator decided beforehand.
+    decided: String,
     memory: Memory,
     dropped_samples: u64,
     first_dropped: Vec<Dropped>,
@@ -127,6 +138,7 @@ impl Record {
                 ..Seconds::default()
             },
             samples: stats.samples,
+            skipped: Skipped { pixels: stats.free_pixels, samples: stats.spared },
             msamples_per_second: per_second(stats.samples),
             rays: Rays {
                 camera: rays.camera,
@@ -135,6 +147,7 @@ impl Record {
                 total: rays.total(),
                 mrays_per_second: per_second(rays.total()),
             },
+            decided: stats.decided.clone(),
             memory: Memory {
                 geometry: scene.report.geometry_bytes,
                 kernel: scene.kernel.memory(),
@@ -169,6 +182,7 @@ impl Record {
             pair("seed", self.seed.to_string()),
             pair("sampler", self.sampler.to_owned()),
             pair("filter", self.filter.to_owned()),
+            pair("chosen", self.decided.clone()),
         ]
     }
 
@@ -243,6 +257,17 @@ impl fmt::Display for Record {
             count(r.shadow),
             r.mrays_per_second
         )?;
+        if self.skipped.samples > 0 {
+            writeln!(
+                f,
+                "skipped {} of {} that see no geometry",
+                plural(self.skipped.samples, "sample"),
+                plural(self.skipped.pixels, "pixel")
+            )?;
+        }
+        if !self.decided.is_empty() {
+            writeln!(f, "chosen  {}", self.decided)?;
+        }
         let m = &self.memory;
         write!(f, "memory  geometry {}, kernel {}", in_words(m.geometry), in_words(m.kernel))?;
         writeln!(f, "{}", m.peak.map_or(String::new(), |p| format!("; peak {}", in_words(p))))?;

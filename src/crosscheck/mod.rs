@@ -220,7 +220,7 @@ impl Check<'_> {
 
     fn compare_tile(&self, rect: PixelRect, worker: &mut Worker) -> Result<TileResult> {
         let settings = &self.plan.settings;
-        let job = Job { scene: self.scene, integrator: self.plan.integrator.as_ref(), settings };
+        let job = Job::new(self.scene, self.plan.integrator.as_ref(), settings);
         // Nothing that an earlier failure has left behind.
         self.comparing.take_seen();
         worker.render_tile(&job, rect, 0..settings.spp);

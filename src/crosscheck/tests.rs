@@ -57,8 +57,7 @@ fn contender(name: &str, kernel: impl Intersectable + 'static) -> Contender {
 }
 
 fn plan(scene: &Scene, contenders: Vec<Contender>) -> Plan {
-    let integrator =
-        PathTracer { max_depth: 3, roulette_depth: 4, light_sampling: true, each_light: false, mis: true };
+    let integrator = PathTracer { max_depth: 3, ..PathTracer::default() };
     let settings =
         RenderSettings { spp: 4, threads: 2, ..RenderSettings::new([scene.film.width, scene.film.height]) };
     Plan { contenders, integrator: Arc::new(integrator), settings, oracle_tests: 1 << 28 }
@@ -207,7 +206,7 @@ fn a_picture_that_differs_where_no_ray_does_fails() {
     let a = Film::new(24, 16, PixelRect::of_size(24, 16));
     let mut b = Film::new(24, 16, PixelRect::of_size(24, 16));
     let plan = plan(&scene, Vec::new());
-    let job = Job { scene: &scene, integrator: plan.integrator.as_ref(), settings: &plan.settings };
+    let job = Job::new(&scene, plan.integrator.as_ref(), &plan.settings);
     let mut worker = Worker::new(&plan.settings);
     worker.render_tile(&job, PixelRect::new(0, 0, 16, 16), 0..1);
     b.add_tile(&worker.film);

@@ -5,20 +5,25 @@ pub mod ambient_occlusion;
 pub mod analytic;
 pub mod direct;
 mod escapes;
+mod guided;
 pub mod normals;
 pub mod path;
 mod pending;
+mod pilot;
 mod points;
+pub mod strategy;
 mod surface;
 pub mod whitted;
 
 use crate::base::hit::HitBatch;
+use crate::base::pixel_rect::PixelRect;
 use crate::base::ray::RayBatch;
 use crate::base::registry::Row;
 use crate::base::vertex::Vertex;
 use crate::color::Rgb;
-use crate::sampler::{Dim, PixelSampler, Slot};
+use crate::sampler::{Dim, PixelSampler, Sampler, Slot};
 use crate::scene::Scene;
+use std::sync::Arc;
 
 /// Every integrator, by name.
 pub static REGISTRY: &[Row<dyn Integrator>] =
@@ -168,6 +173,29 @@ pub struct Workspace {
     pub paths: path::PathScratch,
 }
 
+/// What a render tells an integrator beforehand, so that it may try out what pays.
+#[derive(Debug, Clone, Copy)]
+pub struct PilotPlan {
+    /// Pixels that will be rendered.
+    pub pixels: PixelRect,
+    /// Samples that each of them will take, at most.
+    pub spp: u32,
+    /// Seed of the render.
+    pub seed: u64,
+    /// Kind of its points.
+    pub kind: Sampler,
+}
+
+/// An integrator that has adapted to a scene.
+pub struct Specialised {
+    /// It estimates the same.
+    pub integrator: Arc<dyn Integrator>,
+    /// What was decided, for people and records.
+    pub decided: String,
+    /// Rays that were spent on deciding.
+    pub rays: RayCounts,
+}
+
 /// Estimates the radiance along a block of camera rays.
 pub trait Integrator: Send + Sync {
     /// Fills `out` (reset by the integrator) for every ray of the batch. Results depend on each path's identity
@@ -176,4 +204,16 @@ pub trait Integrator: Send + Sync {
 
     /// Sampler dimensions beyond the camera's that a path may use, for information.
     fn describe(&self) -> String;
+
+    /// Whether camera rays that meet nothing show the scene's background and nothing else, so that a pixel of such rays
+    /// alone need not be asked for.
+    fn shows_background(&self) -> bool {
+        false
+    }
+
+    /// An integrator of the same estimate that suits this scene better, decided by a pilot that is a function of its
+    /// arguments alone; None where there is nothing to decide.
+    fn specialise(&self, _scene: &Scene, _plan: &PilotPlan) -> Option<Specialised> {
+        None
+    }
 }

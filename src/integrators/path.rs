@@ -4,10 +4,13 @@
 use super::escapes::Escapes;
 use super::pending::{Pending, ShadowRays, add_arriving};
 use super::points::VertexPoints;
+use super::strategy::{Strategies, Strategy};
 use super::surface::Surface;
-use super::{CameraBatch, FirstHit, Integrator, PathIds, PathResults, Workspace};
+use super::{
+    CameraBatch, FirstHit, Integrator, PathIds, PathResults, PilotPlan, Specialised, Workspace, pilot,
+};
 use crate::base::hit::{HitBatch, NO_PRIMITIVE};
-use crate::base::light::{PathEnd, Receiver};
+use crate::base::light::{Guide, GuidedLight, PathEnd, Receiver};
 use crate::base::material::Prepared;
 use crate::base::ray::{Coherence, RayBatch};
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
@@ -38,6 +41,7 @@ pub const ROW: Row<dyn Integrator> = Row {
         },
         LIGHT_SAMPLING,
         EACH_LIGHT,
+        STRATEGY,
         ParamSpec {
             name: "mis",
             kind: ParamKind::Bool,
@@ -49,7 +53,8 @@ pub const ROW: Row<dyn Integrator> = Row {
     samples: || {
         let off = |name| Params::new().with(name, Value::Bool(false));
         let each = Params::new().with("each_light", Value::Bool(true));
-        vec![Params::new(), off("light_sampling"), off("mis"), each]
+        let by = |name: &str| Params::new().with("strategy", Value::Text(name.into()));
+        vec![Params::new(), off("light_sampling"), off("mis"), each, by("both"), by("light"), by("bsdf")]
     },
 };
 
@@ -69,10 +74,19 @@ pub(super) const EACH_LIGHT: ParamSpec = ParamSpec {
     doc: "sample each light at a surface, not one that is chosen by what it may bring (beyond 1,024 lights always one)",
 };
 
+/// Shared with `direct`.
+pub(super) const STRATEGY: ParamSpec = ParamSpec {
+    name: "strategy",
+    kind: ParamKind::Choice(&["auto", "both", "light", "bsdf"]),
+    default: Some("auto"),
+    doc: "how a sky that is sampled by products is found: by light samples, scattered rays or both; auto tries them out",
+};
+
 /// Most lights that are sampled each: a shadow ray for every one of them waits at every surface.
 const MOST_EACH: usize = 1024;
 
 /// The integrator `path`; with a depth of 1 it is `direct`.
+#[derive(Clone)]
 pub struct PathTracer {
     /// See the row.
     pub max_depth: u32,
@@ -84,6 +98,25 @@ pub struct PathTracer {
     pub each_light: bool,
     /// See the row.
     pub mis: bool,
+    /// How light at infinity is found.
+    pub strategies: Strategies,
+    /// Whether [`Integrator::specialise`] may change `strategies`.
+    pub auto_strategy: bool,
+}
+
+impl Default for PathTracer {
+    /// What the row builds without parameters.
+    fn default() -> Self {
+        PathTracer {
+            max_depth: 6,
+            roulette_depth: 4,
+            light_sampling: true,
+            each_light: false,
+            mis: true,
+            strategies: Strategies::default(),
+            auto_strategy: true,
+        }
+    }
 }
 
 /// A path on its way.
@@ -95,6 +128,9 @@ pub(super) struct PathState {
     pub pdf: f32,
     /// Where the ray left, for the density of light samples.
     pub from: Receiver,
+    /// Density with which light sampling found the direction on the guided light, if there is one; infinite where what it
+    /// shows there counts nothing.
+    pub guided_pdf: f32,
     /// Squared refractive index of the medium it travels in over that of the camera's.
     pub eta2: f32,
     /// Index into the block.
@@ -111,6 +147,7 @@ pub struct PathScratch {
     /// Which rays of the depth met something.
     hits: Vec<u32>,
     pub(super) points: VertexPoints,
+    pub(super) guide: Guide,
 }
 
 impl Integrator for PathTracer {
@@ -139,6 +176,14 @@ impl Integrator for PathTracer {
     fn describe(&self) -> String {
         format!("path, depth {}", self.max_depth)
     }
+
+    fn shows_background(&self) -> bool {
+        true
+    }
+
+    fn specialise(&self, scene: &Scene, plan: &PilotPlan) -> Option<Specialised> {
+        pilot::choose(self, scene, plan)
+    }
 }
 
 /// What is the same for all paths of a depth.
@@ -150,22 +195,47 @@ pub(super) struct Block<'a> {
     pub mis: bool,
     /// Whether each light is sampled.
     pub each_light: bool,
+    /// The light at infinity that takes surfaces into account.
+    pub guided: Option<(u32, &'a dyn GuidedLight)>,
+    pub strategies: &'a Strategies,
+    /// Whether rays that are scattered at this depth can meet no other light than the guided one.
+    pub guided_alone: bool,
+}
+
+/// None where it is to be tried out.
+pub(super) fn strategy_param(p: &Params) -> Result<Option<Strategy>> {
+    Ok(Strategy::find(p.text_or("strategy", "auto")?))
 }
 
 impl PathTracer {
     fn from_params(p: &Params) -> Result<Self> {
+        let strategy = strategy_param(p)?;
         Ok(PathTracer {
             max_depth: p.number_or("max_depth", 6.0)? as u32,
             roulette_depth: p.number_or("roulette_depth", 4.0)? as u32,
             light_sampling: p.bool_or("light_sampling", true)?,
             each_light: p.bool_or("each_light", false)?,
             mis: p.bool_or("mis", true)?,
+            strategies: Strategies::uniform(strategy.unwrap_or_default()),
+            auto_strategy: strategy.is_none(),
         })
     }
 
-    fn block<'a>(&self, scene: &'a Scene, ids: &'a PathIds, depth: u32) -> Block<'a> {
-        let each_light = self.each_light && scene.lights.list.len() <= MOST_EACH;
-        Block { scene, ids, depth, mis: self.mis, each_light }
+    fn block<'a>(&'a self, scene: &'a Scene, ids: &'a PathIds, depth: u32) -> Block<'a> {
+        let lights = &scene.lights;
+        let guided = if self.light_sampling { lights.guided() } else { None };
+        Block {
+            scene,
+            ids,
+            depth,
+            mis: self.mis,
+            each_light: self.each_light && lights.list.len() <= MOST_EACH,
+            guided,
+            strategies: &self.strategies,
+            guided_alone: depth >= self.max_depth
+                && !scene.features.emitting_surfaces
+                && lights.at_infinity.len() == 1,
+        }
     }
 
     /// Camera rays: coherent, all of throughput 1, most of them perhaps straight into the sky.
@@ -196,8 +266,14 @@ impl PathTracer {
                 let Some(hit) = work.hits.get(i) else { continue };
                 let v = scene.vertex(&rays.get(i), hit, batch.spread);
                 let from = Receiver { p: v.p, ng: Vec3::ZERO, ns: Vec3::ZERO };
-                let state =
-                    PathState { beta: Rgb::WHITE, pdf: f32::INFINITY, from, eta2: 1.0, index: i as u32 };
+                let state = PathState {
+                    beta: Rgb::WHITE,
+                    pdf: f32::INFINITY,
+                    from,
+                    guided_pdf: 0.0,
+                    eta2: 1.0,
+                    index: i as u32,
+                };
                 surfaces.push(Surface::new(scene, v, state, k));
             }
             for s in &surfaces {
@@ -357,7 +433,10 @@ impl Block<'_> {
             for e in escapes.ask(&*lights.list[light as usize]).filter(|e| !e.le.is_black()) {
                 let state = &states[e.number as usize];
                 let end = PathEnd { wi: e.wi, vertex: None };
-                let pdf = || self.light_pdf(light, &end, &state.from);
+                let pdf = || match self.guided {
+                    Some((guided, _)) if guided == light => state.guided_pdf,
+                    _ => self.light_pdf(light, &end, &state.from),
+                };
                 let weight = if state.pdf.is_finite() { self.weight(state, pdf()) } else { 1.0 };
                 out.li[state.index as usize] += state.beta * e.le * weight;
             }

@@ -8,7 +8,7 @@ use super::path::{Block, PathScratch, PathState, PathTracer};
 use super::pending::Pending;
 use super::points::VertexPoint;
 use super::{PathId, light_dim};
-use crate::base::light::{ChosenLight, LightSample, Receiver};
+use crate::base::light::{ChosenLight, Guide, LightSample, Receiver};
 use crate::base::material::{Material, Prepared, Transmission};
 use crate::base::vertex::Vertex;
 use crate::color::Rgb;
@@ -24,13 +24,13 @@ pub(super) struct Surface<'a> {
     /// The path that met it.
     pub state: PathState,
     /// Its number among the hits of the depth.
-    number: usize,
-    material: &'a dyn Material,
+    pub(super) number: usize,
+    pub(super) material: &'a dyn Material,
     transmission: Option<Transmission>,
-    prepared: Prepared,
+    pub(super) prepared: Prepared,
     /// Local direction to the viewer.
     wo: Vec3,
-    receiver: Receiver,
+    pub(super) receiver: Receiver,
     lit: Option<(ChosenLight, LightSample)>,
 }
 
@@ -72,6 +72,12 @@ impl PathTracer {
         for s in surfaces.iter_mut() {
             s.material.prepare(&s.v, &mut s.prepared);
         }
+        if let Some(guided) = block.guided {
+            for s in surfaces.iter() {
+                self.scatter_guided(block, guided, s, work, paths);
+            }
+            return;
+        }
         if self.light_sampling && block.each_light {
             for s in surfaces.iter().filter(|s| !s.material.is_delta()) {
                 block.ask_each(s, work, paths);
@@ -82,17 +88,26 @@ impl PathTracer {
             }
             for s in surfaces.iter() {
                 if let Some((chosen, l)) = &s.lit {
-                    block.connect(s, *chosen, l, work, paths);
+                    block.connect(s, *chosen, l, false, work, paths);
                 }
             }
         }
         for s in surfaces.iter() {
-            self.extend(block, s, work, paths);
+            self.extend(block, s, work, paths, |_, _| 0.0);
         }
     }
 
-    /// The direction in which a path goes on, if it does.
-    fn extend(&self, block: &Block, s: &Surface, work: &mut Workspace, paths: &mut PathScratch) {
+    /// The direction in which a path goes on, if it does. `guided_pdf` tells the density with which light samples find a
+    /// direction on the guided light.
+    #[inline]
+    pub(super) fn extend(
+        &self,
+        block: &Block,
+        s: &Surface,
+        work: &mut Workspace,
+        paths: &mut PathScratch,
+        guided_pdf: impl Fn(&Guide, Vec3) -> f32,
+    ) {
         let VertexPoint { id, bsdf, .. } = paths.points.get(s.number);
         let roulette = block.depth >= self.roulette_depth && block.depth < self.max_depth;
         let lobe = if roulette || s.material.picks_lobe() {
@@ -119,13 +134,15 @@ impl PathTracer {
         work.next.push(&s.v.spawn(wi, key(&id, block.depth + 1)));
         // Light sampling competes wherever it is tried at all, also where it found nothing this time.
         let competes = self.light_sampling && !s.material.is_delta() && !b.delta;
-        paths.next.push(PathState {
+        let state = PathState {
             beta,
             pdf: if competes { b.pdf } else { f32::INFINITY },
             from: s.receiver,
+            guided_pdf: guided_pdf(&paths.guide, wi),
             eta2,
             index: s.state.index,
-        });
+        };
+        paths.next.push(state);
     }
 }
 
@@ -155,19 +172,20 @@ impl Block<'_> {
                 _ => point.id.sampler.get_2d(point.id.index, light_dim(self.depth, number)),
             };
             if let Some(l) = light.sample_li(&s.receiver, u) {
-                self.connect(s, ChosenLight { light: number, pmf: 1.0 }, &l, work, paths);
+                self.connect(s, ChosenLight { light: number, pmf: 1.0 }, &l, false, work, paths);
             }
         }
     }
 
-    /// A shadow ray to what was sampled of a light. (Always inlined: with two callers it would be a call in the loop that
+    /// A shadow ray to what was sampled of a light; `alone` where no scattered ray competes. (Always inlined: with two callers it would be a call in the loop that
     /// most renders run.)
     #[inline(always)]
-    fn connect(
+    pub(super) fn connect(
         &self,
         s: &Surface,
         chosen: ChosenLight,
         l: &LightSample,
+        alone: bool,
         work: &mut Workspace,
         paths: &mut PathScratch,
     ) {
@@ -180,7 +198,7 @@ impl Block<'_> {
             return;
         }
         let pdf = chosen.pmf * l.pdf;
-        let weight = if l.delta || !self.mis { 1.0 } else { power(pdf, e.pdf) };
+        let weight = if l.delta || alone || !self.mis { 1.0 } else { power(pdf, e.pdf) };
         let id = paths.points.get(s.number).id;
         work.shadow.push(&s.v.spawn_to(l.wi, l.dist, key(&id, self.depth) ^ SHADOW_KEY));
         let ask = l.li.is_none().then_some(chosen.light);

@@ -1,83 +1,29 @@
 //! The light of a sky, of whatever kind.
 
+mod options;
+mod placed;
 mod plan;
+mod product;
 
 use crate::base::directions::{DirectionBatch, Directions};
-use crate::base::light::{Extent, Light, LightSample, PathEnd, Receiver};
-use crate::base::skybox::{ChartGrid, ChartPoint, SkyDisc, Skybox};
+use crate::base::light::{Extent, Guide, GuidedLight, Light, LightSample, Lobes, PathEnd, Receiver};
+use crate::base::material::Scattering;
+use crate::base::skybox::{ChartGrid, ChartPoint, Skybox};
 use crate::color::Rgb;
-use crate::error::{Error, Result, unknown_name};
+use crate::error::{Error, Result};
 use crate::math::Frame;
 use crate::memory;
 use crate::sampler::hash::extend_unit;
 use crate::sampling::distribution::ChartDistribution;
 use crate::sampling::warp;
-use glam::{DVec3, Vec2, Vec3};
+use glam::{Vec2, Vec3};
+pub use options::{SkyOptions, SkySampling};
+use placed::{PlacedDisc, Turn};
 use plan::Plan;
+use product::{Choice, ProductTable};
+use std::cell::RefCell;
 use std::f64::consts::PI;
-use std::str::FromStr;
 use std::sync::Arc;
-
-/// How directions to the map of a sky are sampled; discs are sampled uniformly within their cones by all methods.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum SkySampling {
-    /// By the luminance that rises above the average, where that pays: BSDF sampling finds the rest as well (Karlik et
-    /// al. 2019). Under a constant sky nothing is left and there is no sample.
-    #[default]
-    Compensated,
-    /// By luminance.
-    Table,
-    /// By the cosine to the receiver's shading normal.
-    Cosine,
-}
-
-impl SkySampling {
-    /// All methods with their names, as scene files spell them.
-    pub const NAMES: [(&'static str, SkySampling); 3] = [
-        ("compensated", SkySampling::Compensated),
-        ("table", SkySampling::Table),
-        ("cosine", SkySampling::Cosine),
-    ];
-
-    /// One line about it.
-    pub const fn doc(self) -> &'static str {
-        match self {
-            SkySampling::Compensated => {
-                "by the luminance above the average; the rest is left to BSDF sampling"
-            }
-            SkySampling::Table => "by luminance",
-            SkySampling::Cosine => "by the cosine at the receiver, whatever the sky shows",
-        }
-    }
-}
-
-impl FromStr for SkySampling {
-    type Err = Error;
-
-    fn from_str(s: &str) -> Result<Self> {
-        let known = Self::NAMES.iter().map(|n| n.0);
-        let found = Self::NAMES.iter().find(|n| n.0 == s);
-        found.map(|n| n.1).ok_or_else(|| Error::Usage(unknown_name("sky sampling", s, known)))
-    }
-}
-
-/// How a sky is placed and sampled.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SkyOptions {
-    /// Scales its radiance; finite and at least 0.
-    pub intensity: f64,
-    /// Turns it about +y by the right-hand rule (counter-clockwise seen from above), degrees: 90 brings what was at
-    /// +z to +x.
-    pub rotate_y_deg: f64,
-    /// How it is sampled.
-    pub sampling: SkySampling,
-}
-
-impl Default for SkyOptions {
-    fn default() -> Self {
-        SkyOptions { intensity: 1.0, rotate_y_deg: 0.0, sampling: SkySampling::default() }
-    }
-}
 
 /// The light of a skybox. Render space has the axes of world space, so directions are the same in both.
 pub struct SkyLight {
@@ -95,85 +41,12 @@ pub struct SkyLight {
 enum MapSampler {
     None,
     Cosine,
-    Table { grid: ChartGrid, cells: ChartDistribution },
-}
-
-/// A rotation about +y.
-#[derive(Debug, Clone, Copy)]
-struct Turn {
-    sin: f64,
-    cos: f64,
-}
-
-impl Turn {
-    /// None for whole turns.
-    fn new(degrees: f64) -> Option<Self> {
-        let d = degrees.rem_euclid(360.0);
-        // Quarter turns are exact.
-        let (sin, cos) = match d {
-            90.0 => (1.0, 0.0),
-            180.0 => (0.0, -1.0),
-            270.0 => (-1.0, 0.0),
-            _ => d.to_radians().sin_cos(),
-        };
-        (d != 0.0).then_some(Turn { sin, cos })
-    }
-
-    #[inline(always)]
-    fn to_world(self, d: DVec3) -> DVec3 {
-        DVec3::new(d.x * self.cos + d.z * self.sin, d.y, d.z * self.cos - d.x * self.sin)
-    }
-
-    #[inline(always)]
-    fn to_sky(self, d: DVec3) -> DVec3 {
-        DVec3::new(d.x * self.cos - d.z * self.sin, d.y, d.z * self.cos + d.x * self.sin)
-    }
-}
-
-/// A disc of the sky in world space.
-struct PlacedDisc {
-    frame: Frame,
-    /// 1 - cos of its half angle.
-    m: f32,
-    /// Sine of its half angle.
-    sin: f32,
-    radiance: Rgb,
-    /// Probability of sampling it where all discs are in sight.
-    share: f64,
-}
-
-impl PlacedDisc {
-    fn new(disc: &SkyDisc, turn: Option<Turn>, intensity: f32, share: f64) -> Self {
-        let toward = turn.map_or(disc.toward, |t| t.to_world(disc.toward));
-        PlacedDisc {
-            frame: Frame::from_z(toward.as_vec3()),
-            m: (2.0 * (0.5 * disc.half_angle).sin().powi(2)) as f32,
-            sin: disc.half_angle.sin() as f32,
-            radiance: disc.radiance * intensity,
-            share,
-        }
-    }
-
-    /// Whether a unit direction lies within, by the squared chord, which has digits where a cosine has none.
-    #[inline(always)]
-    fn contains(&self, w: Vec3) -> bool {
-        (w - self.frame.n).length_squared() <= 2.0 * self.m
-    }
-
-    /// Whether any of it is above the horizon of a receiver.
-    #[inline(always)]
-    fn in_sight(&self, at: &Receiver) -> bool {
-        at.ng.dot(self.frame.n) >= -self.sin
-    }
-
-    fn sample(&self, u: Vec2) -> Vec3 {
-        let w = self.frame.to_world(warp::uniform_cone(u, self.m)).normalize();
-        if self.contains(w) {
-            return w;
-        }
-        // Rounding carried it over the rim.
-        w.lerp(self.frame.n, 1e-3).normalize()
-    }
+    Table {
+        grid: ChartGrid,
+        cells: ChartDistribution,
+    },
+    /// Discs are among its cells.
+    Product(ProductTable),
 }
 
 impl SkyLight {
@@ -194,16 +67,27 @@ impl SkyLight {
         // Integrals and solid angles of cells in double precision, coarser levels, and the table itself.
         let cells = sky.grid().cells().min(plan::MAX_CELLS) as u64;
         let _room = memory::room(48 * cells, || "the table of a sky".into())?;
+        let intensity = intensity as f32;
+        let disc_total: f64 =
+            sky.discs().iter().map(|d| f64::from(d.radiance.luminance()) * d.solid_angle()).sum();
+        let place = |shares: &[f64]| -> Vec<PlacedDisc> {
+            let shares = sky.discs().iter().zip(shares);
+            shares.map(|(d, &share)| PlacedDisc::new(d, turn, intensity, share)).collect()
+        };
+        let is_plain = sky.constant().is_some() && sky.discs().is_empty();
+        if sampling == SkySampling::Product && !is_plain {
+            let discs = place(&vec![0.0; sky.discs().len()]);
+            let table = ProductTable::new(&*sky, &discs, turn, intensity);
+            let map_total = table.as_ref().map_or(0.0, ProductTable::map_flux);
+            let total = (map_total + disc_total) * f64::from(intensity);
+            let map = table.map_or(MapSampler::None, MapSampler::Product);
+            return Ok(SkyLight { sky, intensity, turn, discs, map, map_share: 0.0, total });
+        }
         let plan = match sky.constant() {
             Some(radiance) => plan_constant(&*sky, f64::from(radiance.luminance()), sampling),
             None => plan::plan(&*sky, sampling),
         };
-        let intensity = intensity as f32;
-        let shares = sky.discs().iter().zip(&plan.disc_shares);
-        let discs: Vec<PlacedDisc> =
-            shares.map(|(d, &share)| PlacedDisc::new(d, turn, intensity, share)).collect();
-        let disc_total: f64 =
-            sky.discs().iter().map(|d| f64::from(d.radiance.luminance()) * d.solid_angle()).sum();
+        let discs = place(&plan.disc_shares);
         let map = match (plan.table, sampling) {
             (Some((grid, cells)), _) => MapSampler::Table { grid, cells },
             (None, SkySampling::Cosine) => MapSampler::Cosine,
@@ -216,7 +100,11 @@ impl SkyLight {
 
     /// Bytes held, with the skybox.
     pub fn memory(&self) -> u64 {
-        let table = if let MapSampler::Table { cells, .. } = &self.map { cells.memory() } else { 0 };
+        let table = match &self.map {
+            MapSampler::Table { cells, .. } => cells.memory(),
+            MapSampler::Product(table) => table.memory(),
+            MapSampler::None | MapSampler::Cosine => 0,
+        };
         self.sky.memory() + table
     }
 
@@ -228,6 +116,7 @@ impl SkyLight {
             MapSampler::Table { grid, .. } => {
                 format!("by a table of {} x {} x {} cells", grid.count, grid.width, grid.height)
             }
+            MapSampler::Product(table) => table.describe(),
         };
         format!("map {map}, {} discs", self.discs.len())
     }
@@ -238,6 +127,13 @@ impl SkyLight {
             None => w,
             Some(t) => t.to_sky(w.as_dvec3()).as_vec3(),
         }
+    }
+
+    /// Where a direction lies on the sky's charts.
+    #[inline(always)]
+    fn locate(&self, w: Vec3) -> ChartPoint {
+        let d = w.as_dvec3();
+        self.sky.locate(self.turn.map_or(d, |t| t.to_sky(d)))
     }
 
     #[inline(always)]
@@ -268,12 +164,11 @@ impl SkyLight {
     #[inline]
     fn map_pdf(&self, at: &Receiver, w: Vec3) -> f64 {
         match &self.map {
-            MapSampler::None => 0.0,
+            MapSampler::None | MapSampler::Product(_) => 0.0,
             MapSampler::Cosine if at.ns == Vec3::ZERO => f64::from(warp::UNIFORM_SPHERE_PDF),
             MapSampler::Cosine => f64::from(warp::cosine_hemisphere_pdf(at.ns.dot(w))),
             MapSampler::Table { grid, cells } => {
-                let d = w.as_dvec3();
-                let c = self.sky.locate(self.turn.map_or(d, |t| t.to_sky(d)));
+                let c = self.locate(w);
                 let cell = |u: f64, n: u32| ((u * f64::from(n)) as u32).min(n - 1);
                 let pmf = cells.pmf(c.chart, cell(c.u, grid.width), cell(c.v, grid.height));
                 cell_density(&*self.sky, grid, c, pmf)
@@ -285,7 +180,7 @@ impl SkyLight {
     #[inline]
     fn sample_map(&self, at: &Receiver, u: [f64; 2]) -> Option<(Vec3, f64)> {
         match &self.map {
-            MapSampler::None => None,
+            MapSampler::None | MapSampler::Product(_) => None,
             MapSampler::Cosine => {
                 let u = Vec2::new(u[0] as f32, u[1] as f32);
                 let w = if at.ns == Vec3::ZERO {
@@ -346,7 +241,7 @@ fn plan_constant(sky: &dyn Skybox, luminance: f64, sampling: SkySampling) -> Pla
         map_total: 4.0 * PI * luminance,
     };
     match sampling {
-        SkySampling::Compensated if sky.discs().is_empty() => none,
+        SkySampling::Product | SkySampling::Compensated if sky.discs().is_empty() => none,
         SkySampling::Cosine if sky.discs().is_empty() => Plan { map_share: 1.0, ..none },
         _ => plan::plan(sky, sampling),
     }
@@ -355,6 +250,9 @@ fn plan_constant(sky: &dyn Skybox, luminance: f64, sampling: SkySampling) -> Pla
 impl Light for SkyLight {
     #[inline]
     fn sample_li(&self, at: &Receiver, u: [f32; 2]) -> Option<LightSample> {
+        if let MapSampler::Product(_) = &self.map {
+            return with_even_guide(self, at, |guide| GuidedLight::sample(self, at, guide, u)).flatten();
+        }
         let total = self.in_sight(at);
         if total <= 0.0 {
             return None;
@@ -387,6 +285,9 @@ impl Light for SkyLight {
         if end.vertex.is_some() || end.wi.dot(at.ng) < 0.0 {
             return 0.0;
         }
+        if let MapSampler::Product(_) = &self.map {
+            return with_even_guide(self, at, |guide| self.pdf(at, guide, end.wi)).unwrap_or(0.0);
+        }
         let map_pdf = if self.map_share > 0.0 { self.map_pdf(at, end.wi) } else { 0.0 };
         self.mixture_pdf(at, end.wi, map_pdf)
     }
@@ -409,6 +310,10 @@ impl Light for SkyLight {
         }
     }
 
+    fn guided(&self) -> Option<&dyn GuidedLight> {
+        matches!(self.map, MapSampler::Product(_)).then_some(self)
+    }
+
     fn at_infinity(&self) -> bool {
         true
     }
@@ -429,6 +334,70 @@ impl Light for SkyLight {
             e += disc.radiance * (std::f32::consts::PI * disc.sin * disc.sin * cos.max(0.0));
         }
         Some(e)
+    }
+}
+
+thread_local! {
+    static GUIDE: RefCell<Guide> = RefCell::default();
+}
+
+/// What `f` makes of a receiver that scatters evenly, for callers that know nothing of its surface; None where nothing
+/// can arrive.
+fn with_even_guide<T>(light: &SkyLight, at: &Receiver, f: impl FnOnce(&Guide) -> T) -> Option<T> {
+    GUIDE.with_borrow_mut(|guide| {
+        let lobes = Lobes { wo: at.ns, scattering: Scattering::EVEN };
+        light.prepare(at, &lobes, guide).then(|| f(guide))
+    })
+}
+
+impl GuidedLight for SkyLight {
+    fn prepare(&self, at: &Receiver, lobes: &Lobes, guide: &mut Guide) -> bool {
+        let MapSampler::Product(table) = &self.map else { return false };
+        table.weigh(at, lobes, guide)
+    }
+
+    fn sample(&self, at: &Receiver, guide: &Guide, u: [f32; 2]) -> Option<LightSample> {
+        let MapSampler::Product(table) = &self.map else { return None };
+        let (wi, pdf) = match table.sample(guide, extend_unit(u))? {
+            Choice::Map { at: c, pmf } => {
+                let d = self.sky.direction(c);
+                let w = self.turn.map_or(d, |t| t.to_world(d)).as_vec3();
+                let map = cell_density(&*self.sky, table.grid(), c, pmf);
+                (w, (map + self.disc_density(table, guide, w)) as f32)
+            }
+            Choice::Disc { disc, u } => {
+                let w = self.discs[disc].sample(Vec2::new(u[0] as f32, u[1] as f32));
+                (w, self.pdf(at, guide, w))
+            }
+        };
+        let seen = wi.dot(at.ng) >= 0.0 && pdf > 0.0;
+        seen.then_some(LightSample { wi, dist: f32::INFINITY, li: None, pdf, delta: false })
+    }
+
+    fn pdf(&self, at: &Receiver, guide: &Guide, wi: Vec3) -> f32 {
+        let MapSampler::Product(table) = &self.map else { return 0.0 };
+        if wi.dot(at.ng) < 0.0 || guide.total() <= 0.0 {
+            return 0.0;
+        }
+        let c = self.locate(wi);
+        let map = cell_density(&*self.sky, table.grid(), c, table.pmf(guide, c));
+        (map + self.disc_density(table, guide, wi)) as f32
+    }
+    fn contrast(&self) -> f32 {
+        let MapSampler::Product(table) = &self.map else { return 1.0 };
+        let mean = self.total / (4.0 * PI);
+        let disc = self.discs.iter().map(|d| f64::from(d.radiance.luminance())).fold(0.0, f64::max);
+        let peak = disc.max(table.peak() * f64::from(self.intensity));
+        if mean > 0.0 { (peak / mean) as f32 } else { 1.0 }
+    }
+}
+
+impl SkyLight {
+    /// The density that the discs add in a direction.
+    #[inline(always)]
+    fn disc_density(&self, table: &ProductTable, guide: &Guide, w: Vec3) -> f64 {
+        let discs = self.discs.iter().enumerate().filter(|(_, d)| d.contains(w));
+        discs.map(|(i, d)| table.disc_pmf(guide, i) * f64::from(warp::uniform_cone_pdf(d.m))).sum()
     }
 }
 

@@ -74,6 +74,11 @@ struct Blinn {
 }
 
 impl Lobe for Blinn {
+    fn alpha(&self) -> f32 {
+        // cos^s against 1 / (cos^2 (a^2 - 1) + 1)^2 near the peak.
+        (2.0 / (self.shininess + 2.0)).sqrt()
+    }
+
     #[inline]
     fn f_cos(&self, wo: Vec3, wi: Vec3) -> LobeValue {
         let h = wo + wi;

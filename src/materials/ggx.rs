@@ -86,6 +86,10 @@ impl Lobe for Facets {
         Some(reflect(wo, h))
     }
 
+    fn alpha(&self) -> f32 {
+        self.ggx.ax
+    }
+
     fn has_white(&self) -> bool {
         true
     }

@@ -1,6 +1,6 @@
 //! What materials of a diffuse base and one glossy lobe share: parameters, the choice between the two, and sampling.
 
-use crate::base::material::{BsdfEval, BsdfSample, Emitter, Material, Prepared, Transmission};
+use crate::base::material::{BsdfEval, BsdfSample, Emitter, Material, Prepared, Scattering, Transmission};
 use crate::base::registry::{ParamKind, ParamSpec, Params};
 use crate::base::shape::Needs;
 use crate::base::vertex::Vertex;
@@ -23,6 +23,9 @@ pub(super) trait Lobe: Send + Sync {
 
     /// Draws a direction, which may lie below the surface: what it would bring is lost.
     fn sample(&self, wo: Vec3, u: [f32; 2]) -> Option<Vec3>;
+
+    /// Width of the GGX distribution of facets that comes near to it.
+    fn alpha(&self) -> f32;
 
     /// Whether the lobe brings something where the specular colour is black.
     fn has_white(&self) -> bool {
@@ -244,6 +247,17 @@ impl<L: Lobe> Material for Glossy<L> {
             }
         }
         sum / (N * N) as f32
+    }
+
+    fn scattering(&self, m: &Prepared) -> Scattering {
+        let m = m.view::<At>();
+        // White on top is Fresnel's, which is little but at grazing.
+        let white = if self.lobe.has_white() { 0.05 } else { 0.0 };
+        Scattering {
+            even: m.diffuse.luminance() * self.style.diffuse_scale,
+            facets: m.specular.luminance() + white,
+            alpha: self.lobe.alpha(),
+        }
     }
 
     fn diffuse(&self, m: &Prepared) -> Rgb {

@@ -1,6 +1,6 @@
 //! Rough metal: GGX facets, and the light that bounces between them.
 
-use crate::base::material::{BsdfEval, BsdfSample, Material, Prepared};
+use crate::base::material::{BsdfEval, BsdfSample, Material, Prepared, Scattering};
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::base::shape::Needs;
 use crate::base::vertex::Vertex;
@@ -223,6 +223,13 @@ impl Material for Metal {
         let e = self.evaluate(at, Pair { wo: up, wi }, lost);
         wi.z *= side;
         (e.pdf > 0.0).then(|| BsdfSample { wi, weight: e.f_cos / e.pdf, pdf: e.pdf, delta: false })
+    }
+
+    fn scattering(&self, m: &Prepared) -> Scattering {
+        let at: &At = m.view();
+        // Light that bounced between facets leaves almost evenly.
+        let even = 0.1 * at.multiple.luminance() * std::f32::consts::FRAC_1_PI;
+        Scattering { even, facets: at.f0.luminance().max(0.05), alpha: (self.ggx.ax * self.ggx.ay).sqrt() }
     }
 
     fn albedo(&self, m: &Prepared, wo: Vec3) -> Rgb {

@@ -53,6 +53,11 @@ fn off_mirror(wo: Vec3, wi: Vec3) -> f32 {
 }
 
 impl Lobe for Phong {
+    fn alpha(&self) -> f32 {
+        // As Blinn's with four times the exponent: half vectors turn half as far.
+        (2.0 / (4.0 * self.shininess + 2.0)).sqrt()
+    }
+
     #[inline]
     fn f_cos(&self, wo: Vec3, wi: Vec3) -> LobeValue {
         let lobe = (self.shininess + 2.0) / TAU * off_mirror(wo, wi).powf(self.shininess);

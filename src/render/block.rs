@@ -1,5 +1,7 @@
 //! The unit of work of a thread: a tile of pixels, its samples dealt out in batches of camera rays.
 
+use super::backdrop::Backdrop;
+use super::coverage::Coverage;
 use super::film::{FilmTile, REPLICATES};
 use super::layers::Layers;
 use super::settings::RenderSettings;
@@ -45,6 +47,10 @@ pub struct Worker {
     pub film: FilmTile,
     /// The tile's further layers.
     pub layers: Layers,
+    /// Pixels of the tile that see nothing.
+    backdrop: Backdrop,
+    /// Samples that were spared by it.
+    pub spared: u64,
     runs: Vec<Run>,
     film_x: Vec<f32>,
     film_y: Vec<f32>,
@@ -68,6 +74,15 @@ pub struct Job<'a> {
     pub integrator: &'a dyn Integrator,
     /// The settings.
     pub settings: &'a RenderSettings,
+    /// Which pixels see any geometry; None where all may.
+    pub coverage: Option<&'a Coverage>,
+}
+
+impl<'a> Job<'a> {
+    /// With a ray for every sample.
+    pub fn new(scene: &'a Scene, integrator: &'a dyn Integrator, settings: &'a RenderSettings) -> Self {
+        Job { scene, integrator, settings, coverage: None }
+    }
 }
 
 /// Indices of replicate `r` among the samples `range` of a pixel: sample s is number s / R of replicate s mod R.
@@ -99,6 +114,8 @@ impl Worker {
         Worker {
             film: FilmTile::new(PixelRect::default()),
             layers: Layers::new(PixelRect::default(), &settings.aovs),
+            backdrop: Backdrop::default(),
+            spared: 0,
             runs: Vec::new(),
             film_x: Vec::new(),
             film_y: Vec::new(),
@@ -120,7 +137,15 @@ impl Worker {
         self.batch.want_first = !job.settings.aovs.is_empty();
         let indices: [Range<u32>; REPLICATES] =
             std::array::from_fn(|replicate| replicate_indices(&range, replicate as u32));
+        let free = |x, y| job.coverage.is_some_and(|c| !c.is_covered(x, y));
+        let has_free = job.coverage.is_some() && rect.pixels().any(|(x, y)| free(x, y));
+        if has_free {
+            self.backdrop.fill(job.scene, job.settings.filter, rect);
+        }
         for (x, y) in rect.pixels() {
+            if has_free && free(x, y) && self.spare(x, y, &indices) {
+                continue;
+            }
             for (replicate, indices) in (0..).zip(&indices).filter(|(_, indices)| !indices.is_empty()) {
                 let mut first = indices.start;
                 while first < indices.end {
@@ -138,6 +163,19 @@ impl Worker {
             }
         }
         self.flush(job);
+    }
+
+    /// Adds a pixel that sees nothing without sampling it; false if it must be sampled all the same.
+    fn spare(&mut self, x: u32, y: u32, indices: &[Range<u32>; REPLICATES]) -> bool {
+        let Some(radiance) = self.backdrop.get(x, y) else { return false };
+        for (replicate, indices) in indices.iter().enumerate() {
+            // Whether it fits depends on the radiance alone: all replicates or none.
+            if !self.film.add_same(x, y, replicate, radiance, indices.len()) {
+                return false;
+            }
+            self.spared += indices.len() as u64;
+        }
+        true
     }
 
     /// Notes a run: whose samples they are, and at which pixel.

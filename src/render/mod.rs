@@ -1,7 +1,9 @@
 //! L4: how a scene becomes a film: the [`Renderer`] deals blocks of pixels to threads, round by round.
 
 pub mod aov;
+mod backdrop;
 pub mod block;
+pub mod coverage;
 pub mod film;
 pub mod film_layers;
 pub mod fixed;
@@ -10,10 +12,11 @@ pub mod settings;
 
 use crate::base::pixel_rect::PixelRect;
 use crate::error::{Error, Result};
-use crate::integrators::{Integrator, RayCounts};
+use crate::integrators::{Integrator, PilotPlan, RayCounts, Specialised};
 use crate::memory;
 use crate::scene::Scene;
 use block::{BadSample, Job, Worker};
+use coverage::Coverage;
 use film::{Film, REPLICATES};
 use layers::Layers;
 use rayon::prelude::*;
@@ -68,6 +71,14 @@ pub struct RenderStats {
     pub bad: Vec<BadSample>,
     /// Whether it was stopped before its last tile.
     pub interrupted: bool,
+    /// What the integrator decided beforehand; empty if nothing.
+    pub decided: String,
+    /// Pixels that no geometry projects into.
+    pub free_pixels: u64,
+    /// Samples of those that needed no ray: their pixels got the filter's integral of what is behind everything.
+    pub spared: u64,
+    /// Rays that were spent on deciding; among `rays`.
+    pub pilot: RayCounts,
 }
 
 /// Decides how a scene is traced.
@@ -110,11 +121,24 @@ impl Renderer {
             layers: Layers::new(crop, &s.aovs),
             stats: RenderStats::default(),
         };
+        let plan = PilotPlan { pixels: crop, spp: s.spp, seed: s.seed, kind: s.sampler };
+        let integrator = match self.integrator.specialise(scene, &plan) {
+            Some(Specialised { integrator, decided, rays }) => {
+                (out.stats.decided, out.stats.pilot) = (decided, rays);
+                integrator
+            }
+            None => self.integrator.clone(),
+        };
+        // A single sample a pixel shows what lies in its middle.
+        let skips = s.skip_background && s.spp > 1 && integrator.shows_background();
+        let coverage = if skips { Coverage::of(scene, crop, s.filter, s.spp) } else { None };
+        out.stats.free_pixels = coverage.as_ref().map_or(0, |c| c.free() as u64);
+        let job = Job { coverage: coverage.as_ref(), ..Job::new(scene, integrator.as_ref(), s) };
         let workers = Mutex::new(Vec::<Worker>::new());
         let mut done = 0;
         while done < s.spp && s.time.is_none_or(|t| done == 0 || start.elapsed() < t) {
             let end = done + round_size(done, s.time).min(s.spp - done);
-            let interrupted = self.render_round(scene, done..end, &workers, &mut out, progress)?;
+            let interrupted = render_round(&job, done..end, &workers, &mut out, progress)?;
             done = end;
             if interrupted {
                 out.stats.interrupted = true;
@@ -127,47 +151,47 @@ impl Renderer {
         for w in lock(&workers).drain(..) {
             stats.rays.add(&w.work.counts);
             stats.bad.extend(w.bad);
+            stats.spared += w.spared;
         }
-        stats.samples = stats.rays.camera;
+        stats.samples = stats.rays.camera + stats.spared;
+        stats.rays.add(&stats.pilot);
         stats.dropped = out.film.counts().dropped;
         stats.bad.sort_by_key(|b| (b.y, b.x, b.replicate, b.index));
         stats.bad.truncate(8);
         Ok(out)
     }
+}
 
-    /// One round over all tiles; says whether it was stopped on the way.
-    fn render_round(
-        &self,
-        scene: &Scene,
-        range: std::ops::Range<u32>,
-        workers: &Mutex<Vec<Worker>>,
-        out: &mut Rendered,
-        progress: &dyn Progress,
-    ) -> Result<bool> {
-        let job = Job { scene, integrator: self.integrator.as_ref(), settings: &self.settings };
-        let stopped = AtomicBool::new(false);
-        let sums = Mutex::new((&mut out.film, &mut out.layers));
-        let samples = u64::from(range.end - range.start);
-        let tiles: Vec<PixelRect> = lock(&sums).0.tiles().collect();
-        tiles.into_par_iter().with_max_len(1).try_for_each(|rect| {
-            if stopped.load(Ordering::Relaxed) || progress.should_stop() {
-                stopped.store(true, Ordering::Relaxed);
-                return Ok(());
-            }
-            let idle = lock(workers).pop();
-            let mut worker = idle.unwrap_or_else(|| Worker::new(&self.settings));
-            worker.render_tile(&job, rect, range.clone());
-            scene.kernel.take_failure()?;
-            let mut sums = lock(&sums);
-            sums.0.add_tile(&worker.film);
-            sums.1.merge(&worker.layers);
-            drop(sums);
-            lock(workers).push(worker);
-            progress.advance(rect.area() as u64 * samples);
-            Ok::<(), Error>(())
-        })?;
-        Ok(stopped.into_inner())
-    }
+/// One round over all tiles; says whether it was stopped on the way.
+fn render_round(
+    job: &Job,
+    range: std::ops::Range<u32>,
+    workers: &Mutex<Vec<Worker>>,
+    out: &mut Rendered,
+    progress: &dyn Progress,
+) -> Result<bool> {
+    let stopped = AtomicBool::new(false);
+    let sums = Mutex::new((&mut out.film, &mut out.layers));
+    let samples = u64::from(range.end - range.start);
+    let tiles: Vec<PixelRect> = lock(&sums).0.tiles().collect();
+    tiles.into_par_iter().with_max_len(1).try_for_each(|rect| {
+        if stopped.load(Ordering::Relaxed) || progress.should_stop() {
+            stopped.store(true, Ordering::Relaxed);
+            return Ok(());
+        }
+        let idle = lock(workers).pop();
+        let mut worker = idle.unwrap_or_else(|| Worker::new(job.settings));
+        worker.render_tile(job, rect, range.clone());
+        job.scene.kernel.take_failure()?;
+        let mut sums = lock(&sums);
+        sums.0.add_tile(&worker.film);
+        sums.1.merge(&worker.layers);
+        drop(sums);
+        lock(workers).push(worker);
+        progress.advance(rect.area() as u64 * samples);
+        Ok::<(), Error>(())
+    })?;
+    Ok(stopped.into_inner())
 }
 
 /// A panic elsewhere has already failed the render; the data behind the lock is sums, which stay sums.

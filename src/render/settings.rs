@@ -25,6 +25,9 @@ pub struct RenderSettings {
     pub sampler: Sampler,
     /// Pixel filter.
     pub filter: PixelFilter,
+    /// Whether pixels that no geometry projects into get the filter's integral of what is behind everything, where that
+    /// is known to a thousandth, instead of samples.
+    pub skip_background: bool,
     /// Worker threads, at least 1.
     pub threads: usize,
     /// Further layers.
@@ -60,6 +63,7 @@ impl RenderSettings {
             seed: 0,
             sampler: Sampler::default(),
             filter: PixelFilter::default(),
+            skip_background: true,
             threads: std::thread::available_parallelism().map_or(1, |n| n.get()),
             aovs: Vec::new(),
         }

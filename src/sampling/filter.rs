@@ -79,6 +79,18 @@ impl PixelFilter {
         }
     }
 
+    /// How much an offset of `x` pixels along one axis counts, next to others: the density of [`PixelFilter::sample`], not
+    /// normalised.
+    pub fn density(self, x: f32) -> f32 {
+        let inside = x.abs() <= self.radius();
+        match self {
+            _ if !inside => 0.0,
+            PixelFilter::BlackmanHarris { radius } => window(f64::from(x / radius)) as f32,
+            PixelFilter::Tent { radius } => 1.0 - x.abs() / radius,
+            PixelFilter::Box | PixelFilter::Center => 1.0,
+        }
+    }
+
     /// Adds [`PixelFilter::sample`] of each point of the unit square to a position. All columns are of one length.
     pub fn add_offsets(self, u: [&[f32]; 2], p: [&mut [f32]; 2]) {
         for (u, p) in u.into_iter().zip(p) {

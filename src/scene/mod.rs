@@ -11,7 +11,7 @@ use crate::base::camera::{Camera, FilmSize};
 use crate::base::geometry::Geometry;
 use crate::base::hit::Hit;
 use crate::base::intersectable::Intersectable;
-use crate::base::light::{Light, LightSampler, PathEnd, Receiver};
+use crate::base::light::{GuidedLight, Light, LightSampler, PathEnd, Receiver};
 use crate::base::material::Material;
 use crate::base::ray::Ray;
 use crate::base::shape::Dropped;
@@ -117,6 +117,12 @@ impl Scene {
 }
 
 impl Lights {
+    /// The light at infinity that takes surfaces into account, if there is one, and its index.
+    #[inline]
+    pub fn guided(&self) -> Option<(u32, &dyn GuidedLight)> {
+        self.at_infinity.iter().find_map(|&i| self.list[i as usize].guided().map(|g| (i, g)))
+    }
+
     /// The light that a vertex lies on.
     #[inline]
     pub fn of_vertex(&self, v: &Vertex) -> Option<u32> {

@@ -86,6 +86,8 @@ impl Reference {
         let mut settings = renderer.settings.clone();
         settings.spp = spp;
         settings.seed = SEED;
+        // What is on trial does not stand as judge.
+        settings.skip_background = false;
         let renderer = Renderer { integrator: renderer.integrator.clone(), settings };
         let film = renderer.render(scene, progress)?.film;
         let truth = Truth::of_film(&film);

@@ -43,6 +43,10 @@ pub static KEYS: &[Key] = &[
     Key::new("max-depth", "longest path in surfaces", |s, v| set_parameter(s, "max_depth", v)).changing(),
     Key::new("sky-sampling", "how the sky is sampled", set_sky_sampling),
     Key::new("light-sampler", "how lights are chosen", set_light_sampler),
+    Key::new("sky-pixels", "integrate or sample pixels that see no geometry", |s, v| {
+        s.settings.skip_background = choose("sky pixels", v, &[("integrate", true), ("sample", false)])?;
+        Ok(())
+    }),
     Key::new("backend", "ray kernel", set_backend),
     Key::new("kernel-mode", "robust or fast", set_mode),
     Key::new("build", "speed of the kernel's build", set_quality),

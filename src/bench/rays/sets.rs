@@ -227,7 +227,7 @@ pub(super) fn camera_rays(scene: &Scene, count: usize) -> Vec<RayBatch> {
     let chosen: Vec<_> = spread(tiles.len(), wanted).into_iter().map(|i| tiles[i]).collect();
     let of_tile = |rect| {
         let keep = Keep(Mutex::default());
-        let job = Job { scene, integrator: &keep, settings: &settings };
+        let job = Job::new(scene, &keep, &settings);
         Worker::new(&settings).render_tile(&job, rect, 0..spp);
         keep.0.into_inner().unwrap_or_else(|e| e.into_inner())
     };

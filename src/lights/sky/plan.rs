@@ -36,7 +36,7 @@ pub(super) struct Plan {
 }
 
 /// Cells of one resolution, and what is known of each.
-struct Level {
+pub(super) struct Level {
     grid: ChartGrid,
     /// Luminance over the cell.
     integral: Vec<f64>,
@@ -62,6 +62,35 @@ fn second_moment(p: f64) -> f64 {
 }
 
 impl Level {
+    /// The finest that fits, and each half as fine as the one before.
+    pub fn all(sky: &dyn Skybox) -> Vec<Self> {
+        let mut levels = vec![Level::finest(sky)];
+        while let Some(coarser) = levels.last().and_then(Level::coarser) {
+            levels.push(coarser);
+        }
+        levels
+    }
+
+    /// Its cells.
+    pub fn grid(&self) -> ChartGrid {
+        self.grid
+    }
+
+    /// Number of cells.
+    pub fn cells(&self) -> usize {
+        self.integral.len()
+    }
+
+    /// Luminance over a cell.
+    pub fn integral(&self, i: usize) -> f64 {
+        self.integral[i]
+    }
+
+    /// Of a cell.
+    pub fn solid_angle(&self, i: usize) -> f64 {
+        self.solid_angle[i]
+    }
+
     /// The finest that fits.
     fn finest(sky: &dyn Skybox) -> Self {
         let mut grid = sky.grid();
@@ -97,7 +126,14 @@ impl Level {
         })
     }
 
-    fn square(&self, i: usize) -> f64 {
+    /// Largest mean luminance of a cell.
+    pub fn peak(&self) -> f64 {
+        let of = |(flux, angle): (&f64, &f64)| if *angle > 0.0 { flux / angle } else { 0.0 };
+        self.integral.iter().zip(&self.solid_angle).map(of).fold(0.0, f64::max)
+    }
+
+    /// Squared luminance over a cell.
+    pub fn square(&self, i: usize) -> f64 {
         match self.square.get(i) {
             Some(&s) => s,
             None if self.solid_angle[i] > 0.0 => self.integral[i] * (self.integral[i] / self.solid_angle[i]),
@@ -124,7 +160,7 @@ impl Level {
 }
 
 /// A sum in parallel whose bits do not depend on the number of threads.
-fn ordered_sum(n: usize, f: impl Fn(usize) -> f64 + Sync) -> f64 {
+pub(super) fn ordered_sum(n: usize, f: impl Fn(usize) -> f64 + Sync) -> f64 {
     const CHUNK: usize = 4096;
     let chunk = |c: usize| (c * CHUNK..((c + 1) * CHUNK).min(n)).map(&f).sum::<f64>();
     let parts: Vec<f64> = (0..n.div_ceil(CHUNK)).into_par_iter().map(chunk).collect();
@@ -211,10 +247,7 @@ impl Discs {
 /// Decides on a sky that is not constant.
 pub(super) fn plan(sky: &dyn Skybox, sampling: SkySampling) -> Plan {
     let discs = Discs::of(sky);
-    let mut levels = vec![Level::finest(sky)];
-    while let Some(coarser) = levels.last().and_then(Level::coarser) {
-        levels.push(coarser);
-    }
+    let levels = Level::all(sky);
     let finest = &levels[0];
     let n = finest.integral.len();
     let map_total = ordered_sum(n, |i| finest.integral[i]);
@@ -222,7 +255,7 @@ pub(super) fn plan(sky: &dyn Skybox, sampling: SkySampling) -> Plan {
         // MIS compensation: what the average level brings, the cosine lobe finds as well (Karlik et al., "MIS
         // Compensation: Optimizing Sampling Techniques in Multiple Importance Sampling", 2019, 4.3).
         SkySampling::Compensated => map_total / ordered_sum(n, |i| finest.solid_angle[i]),
-        SkySampling::Table | SkySampling::Cosine => 0.0,
+        SkySampling::Product | SkySampling::Table | SkySampling::Cosine => 0.0,
     };
     let trial = levels.iter().find(|l| l.grid.cells() <= TRIAL_CELLS).or(levels.last()).unwrap_or(finest);
     let nothing = Plan { table: None, map_share: 0.0, disc_shares: discs.shares(0.0), map_total };

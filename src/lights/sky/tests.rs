@@ -1,4 +1,5 @@
 mod charts;
+mod product;
 
 use super::*;
 use crate::base::image_data::{ImageData, Texels};
@@ -12,7 +13,8 @@ use crate::testing::{integrate_rect, integrate_sphere};
 use charts::{Charts, chi_square_charts};
 use std::f64::consts::TAU;
 
-const METHODS: [SkySampling; 3] = [SkySampling::Compensated, SkySampling::Table, SkySampling::Cosine];
+const METHODS: [SkySampling; 4] =
+    [SkySampling::Product, SkySampling::Compensated, SkySampling::Table, SkySampling::Cosine];
 
 fn anywhere() -> Receiver {
     Receiver { p: Vec3::ZERO, ng: Vec3::ZERO, ns: Vec3::ZERO }
@@ -73,7 +75,7 @@ fn samples_follow_their_density() {
         };
         let pdf = |w| if in_disc(w) { 0.0 } else { light.pdf_li(&at, &away(w)) };
         match light.map {
-            MapSampler::Table { .. } => {
+            MapSampler::Table { .. } | MapSampler::Product(_) => {
                 let charts = Charts { sky: &**sky, light: &light, at: &at };
                 chi_square_charts(what, &how, &charts, sample, pdf);
             }
@@ -183,7 +185,8 @@ fn irradiance_is_unbiased_whatever_the_method() {
     each_sky(|what, sky| {
         for (k, sampling) in METHODS.into_iter().enumerate() {
             let light = light(sky, sampling, 37.0);
-            let n = [Vec3::Y, Vec3::new(0.6, 0.0, 0.8), Vec3::new(-0.48, -0.6, 0.64)][k];
+            let normals = [[0.0, 1.0, 0.0], [0.6, 0.0, 0.8], [-0.48, -0.6, 0.64], [0.8, -0.6, 0.0]];
+            let n = Vec3::from(normals[k]);
             // From the sky alone, by quadrature within each of its cells: the receiver's horizon may cut the one that
             // holds all the light. Cells of small grids are cut up, for the horizon's sake too.
             let normal = light.turn.unwrap().to_sky(n.as_dvec3());
@@ -240,7 +243,7 @@ fn a_sun_of_one_texel_is_never_lost() {
         let c = ChartPoint { chart: 0, u: 1234.5 / w as f64, v: 700.5 / h as f64 };
         sky.direction(c).as_vec3()
     };
-    for sampling in [SkySampling::Compensated, SkySampling::Table] {
+    for sampling in [SkySampling::Product, SkySampling::Compensated, SkySampling::Table] {
         let light = light(&sky, sampling, 0.0);
         let mut rng = TestRng::new(1);
         let near = |w: Vec3| (w - toward).length() < 3.0 * std::f32::consts::PI / 2048.0;

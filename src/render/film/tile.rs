@@ -157,6 +157,25 @@ impl FilmTile {
         dropped
     }
 
+    /// Adds `n` samples of one pixel and one replicate that are all the same and transparent; false, and nothing is
+    /// added, if they are too large for the fast sums or not finite.
+    pub fn add_same(&mut self, x: u32, y: u32, replicate: usize, radiance: Rgb, n: usize) -> bool {
+        let at = self.index(x, y);
+        let sample = FilmSample { radiance, alpha: 0.0 };
+        let Some(steps) = quantise_small(sample.to_array()) else { return false };
+        let mut left = n;
+        while left > 0 {
+            let now = left.min(FLUSH_AFTER);
+            if self.pending + now > FLUSH_AFTER {
+                self.flush();
+            }
+            self.add_steps(at, replicate, steps.map(|s| s.wrapping_mul(now as i64)));
+            self.count(at, replicate, now);
+            left -= now;
+        }
+        true
+    }
+
     #[inline]
     fn add_steps(&mut self, at: usize, replicate: usize, steps: Lanes) {
         accumulate(&mut self.sums[at][replicate & 1], steps);

@@ -1,0 +1,290 @@
+//! Which strategy suits which material, tried out before a render.
+//!
+//! Pixels of a coarse lattice are rendered with each strategy, by the integrator itself and with the points that the
+//! render will use, in two independent halves; their spread is the variance that the render would have, stratification,
+//! visibility and all. Rays are counted, not timed, so that the choice is a function of scene and seed. A material's
+//! strategy is the one with the least variance times cost. Materials that few of the pixels show keep to what is good in
+//! most scenes: light samples alone where they scatter evenly, both otherwise.
+
+use super::path::PathTracer;
+use super::strategy::{Strategies, Strategy};
+use super::{CameraBatch, Integrator, PathId, PathResults, PilotPlan, RayCounts, Specialised, Workspace};
+use crate::base::camera::FilmSamples;
+use crate::base::hit::HitBatch;
+use crate::base::material::{Material, Prepared};
+use crate::base::ray::{Coherence, RayBatch};
+use crate::base::vertex::Vertex;
+use crate::color::Rgb;
+use crate::sampler::ray_key;
+use crate::scene::Scene;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Samples of a pixel and half.
+const SAMPLES: u32 = 8;
+/// Most pixels of a material that are tried.
+const MOST: usize = 384;
+/// Fewer say nothing.
+const LEAST: usize = 24;
+/// Most part of a render's samples that is spent on trying.
+const SHARE: f64 = 0.03;
+/// Most camera rays that look for materials.
+const SCOUTS: usize = 8192;
+/// Seeds of pilots lie apart from those of renders.
+const SEED: u64 = 0x7069_6c6f_7400_0000;
+/// As [`crate::bench::error::measure::EPSILON`]: what a dark pixel counts for.
+const EPSILON: f64 = 0.01;
+
+/// What is spent on a sample beside its rays, in rays of a shadow's cost.
+const SAMPLE_COST: f64 = 1.0;
+/// The same of a coherent camera ray, a scattered ray with the surface that it may meet, and a shadow ray with its light
+/// sample.
+const RAY_COSTS: [f64; 3] = [0.5, 1.6, 1.6];
+
+/// Most contrast of a light that scattered rays, or light samples that know little of narrow lobes, are trusted with.
+/// A pilot of thousands of samples overlooks what is met by one in some hundreds at most; at this contrast that is worth
+/// some percent of the mean.
+const TAME: f32 = 16.0;
+
+/// What is tried for a material. Scattered rays alone miss what is small and bright. So do light samples on narrow lobes:
+/// within a coarse cell with a sun, the rest of the cell is hardly ever drawn, and a lobe may lie just there.
+fn candidates(scattering_is_even: bool, contrast: f32) -> &'static [Strategy] {
+    match (contrast <= TAME, scattering_is_even) {
+        (true, _) => &[Strategy::Both, Strategy::Light, Strategy::Bsdf],
+        (false, true) => &[Strategy::Both, Strategy::Light],
+        (false, false) => &[Strategy::Both],
+    }
+}
+
+/// A kind of surface: those that share a material.
+struct Class<'a> {
+    material: &'a Arc<dyn Material>,
+    scattering_is_even: bool,
+    /// Where it was seen first by a camera ray.
+    pixels: Vec<[u32; 2]>,
+    strategy: Strategy,
+}
+
+/// Numbers of the classes of all objects and slots, and the classes.
+struct Classes<'a> {
+    list: Vec<Class<'a>>,
+    /// By object, then slot.
+    of: Vec<Vec<usize>>,
+}
+
+impl<'a> Classes<'a> {
+    fn new(scene: &'a Scene) -> Self {
+        let mut all = Classes { list: Vec::new(), of: Vec::new() };
+        // A material that thousands of objects share is mostly that of the object before.
+        let mut by_address = std::collections::HashMap::new();
+        for object in &scene.objects {
+            let slots = object.materials.iter().map(|material| {
+                *by_address.entry(Arc::as_ptr(material).cast::<()>()).or_insert_with(|| {
+                    let class = Class {
+                        material,
+                        scattering_is_even: true,
+                        pixels: Vec::new(),
+                        strategy: Strategy::Both,
+                    };
+                    all.list.push(class);
+                    all.list.len() - 1
+                })
+            });
+            let slots = slots.collect();
+            all.of.push(slots);
+        }
+        all
+    }
+
+    fn of_vertex(&mut self, v: &Vertex) -> &mut Class<'a> {
+        &mut self.list[self.of[v.object as usize][v.slot as usize]]
+    }
+}
+
+/// See the module.
+pub(super) fn choose(tracer: &PathTracer, scene: &Scene, plan: &PilotPlan) -> Option<Specialised> {
+    if !(tracer.auto_strategy && tracer.light_sampling && tracer.mis) {
+        return None;
+    }
+    let contrast = scene.lights.guided()?.1.contrast();
+    let mut classes = Classes::new(scene);
+    let mut rays = RayCounts::default();
+    let samples = plan.pixels.area() as f64 * f64::from(plan.spp);
+    let of_class = SAMPLES as usize * 2 * Strategy::NAMES.len();
+    let affordable = (SHARE * samples / of_class as f64) as usize;
+    let scouts = ((SHARE * samples) as usize).min(SCOUTS);
+    if affordable >= LEAST {
+        rays.camera += scout(scene, plan, scouts, &mut classes);
+    }
+    let most = (affordable / classes.list.len().max(1)).min(MOST);
+    for class in classes.list.iter_mut().filter(|c| !c.material.is_delta() && !c.material.is_black()) {
+        if class.pixels.len().min(most) < LEAST {
+            class.strategy = if class.scattering_is_even { Strategy::Light } else { Strategy::Both };
+            continue;
+        }
+        let candidates = candidates(class.scattering_is_even, contrast);
+        if let [only] = candidates {
+            class.strategy = *only;
+            continue;
+        }
+        thin(&mut class.pixels, most);
+        let run = |s: &Strategy| Trial::run(tracer, scene, plan, &class.pixels, *s);
+        let trials: Vec<Trial> = candidates.iter().map(run).collect();
+        trials.iter().for_each(|t| rays.add(&t.rays));
+        class.strategy = best(&trials);
+    }
+    let list = &classes.list;
+    let strategies = Strategies::by_object(
+        classes.of.iter().map(|slots| slots.iter().map(|&c| list[c].strategy).collect()),
+    );
+    let integrator = Arc::new(PathTracer { strategies, auto_strategy: false, ..tracer.clone() });
+    Some(Specialised { integrator, decided: describe(scene, &classes), rays })
+}
+
+/// Keeps about `most`, evenly.
+fn thin(pixels: &mut Vec<[u32; 2]>, most: usize) {
+    let n = pixels.len();
+    if n > most {
+        *pixels = (0..most).map(|i| pixels[i * n / most]).collect();
+    }
+}
+
+/// Notes which pixels of a lattice show which material; returns the rays that took.
+fn scout(scene: &Scene, plan: &PilotPlan, scouts: usize, classes: &mut Classes) -> u64 {
+    let area = plan.pixels.area();
+    let step = ((area as f64 / scouts as f64).sqrt().ceil() as u32).max(1);
+    let lattice = |from: u32, to: u32| (from + step / 2..to).step_by(step as usize);
+    let rect = plan.pixels;
+    let pixels: Vec<[u32; 2]> =
+        lattice(rect.y0, rect.y1).flat_map(|y| lattice(rect.x0, rect.x1).map(move |x| [x, y])).collect();
+    let coordinate = |axis: usize| pixels.iter().map(|p| p[axis] as f32 + 0.5).collect::<Vec<f32>>();
+    let (x, y, half) = (coordinate(0), coordinate(1), vec![0.5; pixels.len()]);
+    let lens: &[f32] = if scene.camera.has_lens() { &half } else { &[] };
+    let mut rays = RayBatch::default();
+    rays.resize(pixels.len());
+    scene.camera.fill_rays(&FilmSamples { x: &x, y: &y, lens_u: lens, lens_v: lens }, &mut rays);
+    let mut hits = HitBatch::default();
+    scene.kernel.intersect_batch(&rays, &mut hits, Coherence::Coherent);
+    for (i, pixel) in pixels.iter().enumerate() {
+        let Some(hit) = hits.get(i) else { continue };
+        let v = scene.vertex(&rays.get(i), hit, 0.0);
+        let mut prepared = Prepared::default();
+        let class = classes.of_vertex(&v);
+        class.material.prepare(&v, &mut prepared);
+        class.scattering_is_even &= class.material.scattering(&prepared).facets == 0.0;
+        class.pixels.push(*pixel);
+    }
+    pixels.len() as u64
+}
+
+/// What a strategy came to.
+struct Trial {
+    strategy: Strategy,
+    /// Means of the two halves, by pixel.
+    halves: Vec<[Rgb; 2]>,
+    rays: RayCounts,
+}
+
+impl Trial {
+    fn run(
+        tracer: &PathTracer,
+        scene: &Scene,
+        plan: &PilotPlan,
+        pixels: &[[u32; 2]],
+        strategy: Strategy,
+    ) -> Self {
+        let tracer = PathTracer { strategies: Strategies::uniform(strategy), ..tracer.clone() };
+        // Chunks of a size that does not depend on the number of threads, joined in their order.
+        let parts: Vec<(Vec<[Rgb; 2]>, RayCounts)> =
+            pixels.par_chunks(64).map(|chunk| trace(&tracer, scene, plan, chunk)).collect();
+        let mut trial = Trial { strategy, halves: Vec::new(), rays: RayCounts::default() };
+        for (halves, rays) in parts {
+            trial.halves.extend(halves);
+            trial.rays.add(&rays);
+        }
+        trial
+    }
+
+    /// Counted, in rays of a shadow's cost.
+    fn cost(&self) -> f64 {
+        let samples = self.rays.camera as f64;
+        let kinds = [self.rays.camera, self.rays.scattered, self.rays.shadow];
+        samples * SAMPLE_COST + kinds.iter().zip(RAY_COSTS).map(|(n, c)| *n as f64 * c).sum::<f64>()
+    }
+}
+
+/// The means of both halves of some pixels. The camera's rays go through the middles: antialiasing would only add to the
+/// variance of all strategies alike.
+fn trace(
+    tracer: &PathTracer,
+    scene: &Scene,
+    plan: &PilotPlan,
+    pixels: &[[u32; 2]],
+) -> (Vec<[Rgb; 2]>, RayCounts) {
+    let mut batch = CameraBatch { spread: scene.camera.pixel_spread(), ..CameraBatch::default() };
+    let (mut x, mut y) = (Vec::new(), Vec::new());
+    for &[px, py] in pixels {
+        for half in 0..2 {
+            let sampler = plan.kind.pixel(plan.seed ^ SEED, px, py, half);
+            let key = ray_key(px, py, half);
+            batch.ids.extend(PathId { sampler, index: 0, key }, SAMPLES as usize);
+            x.resize(x.len() + SAMPLES as usize, px as f32 + 0.5);
+            y.resize(y.len() + SAMPLES as usize, py as f32 + 0.5);
+        }
+    }
+    let middle = vec![0.5; if scene.camera.has_lens() { x.len() } else { 0 }];
+    batch.rays.resize(x.len());
+    scene.camera.fill_rays(&FilmSamples { x: &x, y: &y, lens_u: &middle, lens_v: &middle }, &mut batch.rays);
+    let (mut work, mut out) = (Workspace::default(), PathResults::default());
+    tracer.trace(scene, &batch, &mut work, &mut out);
+    let mean = |samples: &[Rgb]| {
+        let finite = samples.iter().filter(|c| c.is_finite());
+        finite.fold(Rgb::BLACK, |sum, c| sum + *c) / samples.len() as f32
+    };
+    let halves = out.li.chunks_exact(SAMPLES as usize).map(mean).collect::<Vec<_>>();
+    (halves.chunks_exact(2).map(|h| [h[0], h[1]]).collect(), work.counts)
+}
+
+/// The strategy of the least variance times cost. Squared differences of halves are weighed as relative errors are, by
+/// a mean over all trials, so that no trial is favoured by its own noise.
+fn best(trials: &[Trial]) -> Strategy {
+    let pixels = trials.first().map_or(0, |t| t.halves.len());
+    let means: Vec<Rgb> = (0..pixels)
+        .map(|i| {
+            let sum = trials.iter().fold(Rgb::BLACK, |s, t| s + t.halves[i][0] + t.halves[i][1]);
+            sum / (2 * trials.len()) as f32
+        })
+        .collect();
+    let mean = means.iter().map(|c| f64::from(c.luminance())).sum::<f64>() / pixels.max(1) as f64;
+    let score = |t: &Trial| {
+        let squares = t.halves.iter().zip(&means).map(|([a, b], m)| {
+            let d = f64::from((*a - *b).luminance());
+            let scale = f64::from(m.luminance()).powi(2) + EPSILON * mean * mean;
+            if d == 0.0 { 0.0 } else { d * d / scale }
+        });
+        squares.sum::<f64>() * t.cost()
+    };
+    let found = trials.iter().min_by(|a, b| score(a).total_cmp(&score(b)));
+    found.map_or(Strategy::Both, |t| t.strategy)
+}
+
+/// "light for 3 materials (clay, ...), both for 1".
+fn describe(scene: &Scene, classes: &Classes) -> String {
+    let mut parts = Vec::new();
+    for (name, strategy) in Strategy::NAMES {
+        let wanted = |c: &Class| c.strategy == strategy && !c.material.is_delta() && !c.material.is_black();
+        let n = classes.list.iter().filter(|c| wanted(c)).count();
+        if n == 0 {
+            continue;
+        }
+        let first = scene
+            .objects
+            .iter()
+            .zip(&classes.of)
+            .find(|(_, slots)| slots.first().is_some_and(|&c| wanted(&classes.list[c])));
+        let example = first.map_or(String::new(), |(o, _)| format!(" ({}...)", o.name));
+        let s = if n == 1 { "" } else { "s" };
+        parts.push(format!("{name} for {n} material{s}{}", if n > 1 { example } else { String::new() }));
+    }
+    format!("sky found by {}", parts.join(", "))
+}

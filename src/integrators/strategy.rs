@@ -1,0 +1,66 @@
+//! How light at infinity is found from a surface: by asking the light, by going on as the surface scatters, or by both.
+
+use crate::base::vertex::Vertex;
+
+/// Which ways of sampling a guided light (see [`crate::base::light::GuidedLight`]) are tried at a surface point. Each by
+/// itself is unbiased.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Strategy {
+    /// Both, joined by multiple importance sampling.
+    #[default]
+    Both,
+    /// The light alone: scattered rays that meet it count nothing, and are not traced where they can meet nothing else.
+    Light,
+    /// The material alone: no shadow ray.
+    Bsdf,
+}
+
+impl Strategy {
+    /// All of them with their names.
+    pub const NAMES: [(&'static str, Strategy); 3] =
+        [("both", Strategy::Both), ("light", Strategy::Light), ("bsdf", Strategy::Bsdf)];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        Self::NAMES.iter().find(|n| n.1 == self).map_or("", |n| n.0)
+    }
+
+    /// That of this name.
+    pub fn find(name: &str) -> Option<Self> {
+        Self::NAMES.iter().find(|n| n.0 == name).map(|n| n.1)
+    }
+}
+
+/// The strategy of every surface.
+#[derive(Debug, Clone, Default)]
+pub struct Strategies {
+    /// Where the table says nothing.
+    usual: Strategy,
+    /// Index into `by_slot` of an object's first material; one more than there are objects, or empty.
+    first_slot: Vec<u32>,
+    by_slot: Vec<Strategy>,
+}
+
+impl Strategies {
+    /// The same everywhere.
+    pub fn uniform(strategy: Strategy) -> Self {
+        Strategies { usual: strategy, ..Strategies::default() }
+    }
+
+    /// By object and slot, in the order of the scene's table of objects.
+    pub fn by_object(objects: impl Iterator<Item = Vec<Strategy>>) -> Self {
+        let mut all = Strategies { first_slot: vec![0], ..Strategies::default() };
+        for slots in objects {
+            all.by_slot.extend(slots);
+            all.first_slot.push(all.by_slot.len() as u32);
+        }
+        all
+    }
+
+    /// That of a surface point.
+    #[inline]
+    pub fn of(&self, v: &Vertex) -> Strategy {
+        let first = self.first_slot.get(v.object as usize).map_or(0, |f| *f as usize);
+        self.by_slot.get(first + v.slot as usize).copied().unwrap_or(self.usual)
+    }
+}

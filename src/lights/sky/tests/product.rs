@@ -1,0 +1,176 @@
+//! Product sampling as integrators use it: prepared for a surface that scatters in some way.
+
+use super::*;
+use crate::sampling::distribution::Distribution1D;
+
+const SCATTERINGS: [Scattering; 4] = [
+    Scattering::EVEN,
+    Scattering { even: 0.0, facets: 0.9, alpha: 0.3 },
+    Scattering { even: 0.0, facets: 0.9, alpha: 0.02 },
+    Scattering { even: 0.1, facets: 0.3, alpha: 0.1 },
+];
+
+/// A viewer above the horizon.
+fn viewer(rng: &mut TestRng, n: Vec3) -> Vec3 {
+    let w = rng.direction();
+    if w.dot(n) < 0.0 { -w } else { w }
+}
+
+#[test]
+fn probabilities_of_all_cells_and_discs_sum_to_one() {
+    each_sky(|what, sky| {
+        let light = light(sky, SkySampling::Product, 30.0);
+        let MapSampler::Product(table) = &light.map else { return };
+        let grid = *table.grid();
+        let mut rng = TestRng::new(1);
+        for scattering in SCATTERINGS {
+            let at = facing(rng.direction());
+            let mut guide = Guide::default();
+            let lobes = Lobes { wo: viewer(&mut rng, at.ns), scattering };
+            if !light.prepare(&at, &lobes, &mut guide) {
+                continue;
+            }
+            let (w, h) = (grid.width as usize, grid.height as usize);
+            let map = (0..grid.cells()).map(|i| {
+                let u = ((i % w) as f64 + 0.5) / w as f64;
+                let v = ((i / w % h) as f64 + 0.5) / h as f64;
+                table.pmf(&guide, ChartPoint { chart: (i / (w * h)) as u32, u, v })
+            });
+            let discs = (0..light.discs.len()).map(|d| table.disc_pmf(&guide, d));
+            let sum = map.sum::<f64>() + discs.sum::<f64>();
+            // Each weight of a cell within its part is an f32, normalised over the part in f64.
+            assert!((sum - 1.0).abs() < 1e-6, "{what} {scattering:?}: {sum}");
+        }
+    });
+}
+
+#[test]
+fn what_a_surface_makes_of_it_is_drawn_as_the_density_says() {
+    // Counts in the coarse cells and discs against their probabilities: what the tests of the light alone, which know an
+    // even surface only, do not reach.
+    let mut light_of = Vec::new();
+    each_sky(|what, sky| light_of.push((what.to_owned(), light(sky, SkySampling::Product, 77.0))));
+    let tests = (light_of.len() * SCATTERINGS.len()) as u32;
+    let mut rng = TestRng::new(9);
+    for (what, light) in &light_of {
+        let MapSampler::Product(table) = &light.map else { continue };
+        for scattering in SCATTERINGS {
+            let at = facing(rng.direction());
+            let mut guide = Guide::default();
+            let lobes = Lobes { wo: viewer(&mut rng, at.ns), scattering };
+            if !light.prepare(&at, &lobes, &mut guide) {
+                continue;
+            }
+            let n = 20_000;
+            let mut counts = vec![0.0; guide.weights.len()];
+            for _ in 0..n {
+                let Some(choice) = table.sample(&guide, extend_unit(rng.vec2().to_array())) else { continue };
+                counts[table.cell_of(&choice)] += 1.0;
+            }
+            let total = guide.total();
+            let expected: Vec<f64> =
+                guide.weights.iter().map(|w| f64::from(n) * f64::from(*w) / total).collect();
+            chi_square_counts(&format!("{what} {scattering:?}"), tests, &counts, &expected);
+            for _ in 0..200 {
+                let u = rng.vec2().to_array();
+                let Some(s) = GuidedLight::sample(light, &at, &guide, u) else { continue };
+                let pdf = light.pdf(&at, &guide, s.wi);
+                assert!((pdf - s.pdf).abs() <= 1e-5 * s.pdf, "{what}: {pdf} {}", s.pdf);
+            }
+        }
+    }
+}
+
+/// Relative variance of one sample of the light a surface sends to its viewer, all directions open.
+fn variance(light: &SkyLight, at: &Receiver, wo: Vec3, material: &dyn Fn(Vec3) -> f32) -> f64 {
+    let mut rng = TestRng::new(4);
+    let (mut sum, mut sum2) = (0.0, 0.0);
+    let n = 20_000;
+    let mut guide = Guide::default();
+    let scattering = Scattering { even: 0.3, facets: 0.0, alpha: 1.0 };
+    let guided = light.guided();
+    for _ in 0..n {
+        let u = rng.vec2().to_array();
+        let s = match guided {
+            Some(g) => {
+                g.prepare(at, &Lobes { wo, scattering }, &mut guide);
+                g.sample(at, &guide, u)
+            }
+            None => light.sample_li(at, u),
+        };
+        let x = s.map_or(0.0, |s| f64::from(light.arriving(&s).luminance() * material(s.wi) / s.pdf));
+        sum += x;
+        sum2 += x * x;
+    }
+    let mean = sum / f64::from(n);
+    sum2 / f64::from(n) / (mean * mean) - 1.0
+}
+
+#[test]
+fn an_open_diffuse_surface_hardly_varies() {
+    // A bright spot, wide next to the cells of the table: bilinear filters are smooth within them.
+    let spot = |i: usize| {
+        let (x, y) = ((i % 256) as f32 - 90.0, (i / 256) as f32 - 80.0);
+        1.0 + 60.0 * (-(x * x + y * y) / 200.0).exp()
+    };
+    let sky = sky("sphere", picture(256, 128, spot));
+    let n = Vec3::new(0.6, 0.64, -0.48);
+    let (at, f) = (facing(n), |w: Vec3| 0.3 * w.dot(n).max(0.0));
+    let of = |sampling| variance(&light(&sky, sampling, 0.0), &at, n, &f);
+    let (product, table) = (of(SkySampling::Product), of(SkySampling::Table));
+    // What is left is the cosine within coarse cells of 11 degrees.
+    assert!(product < 0.12 && product < 0.2 * table, "{product} {table}");
+}
+
+#[test]
+fn strata_of_the_square_stay_strata() {
+    // The mean over a stratified set of n^2 points against that of random ones: inversion keeps most of the gain.
+    let sky = sky("gradient", Params::new());
+    let light = light(&sky, SkySampling::Product, 0.0);
+    let n = Vec3::Y;
+    let at = facing(n);
+    let value = |u: [f32; 2]| {
+        let s = light.sample_li(&at, u);
+        s.map_or(0.0, |s| f64::from(light.arriving(&s).luminance() * s.wi.dot(n).max(0.0) / s.pdf))
+    };
+    let (side, runs) = (16, 100);
+    let mut rng = TestRng::new(8);
+    let mut spread = [0.0; 2];
+    for (k, spread) in spread.iter_mut().enumerate() {
+        let means: Vec<f64> = (0..runs)
+            .map(|_| {
+                let points = (0..side * side).map(|i| {
+                    let u = rng.vec2().to_array();
+                    let cell = [(i % side) as f32, (i / side) as f32];
+                    if k == 0 { u } else { [0, 1].map(|a| (cell[a] + u[a]) / side as f32) }
+                });
+                points.map(value).sum::<f64>() / f64::from(side * side)
+            })
+            .collect();
+        let mean = means.iter().sum::<f64>() / means.len() as f64;
+        *spread = means.iter().map(|m| (m - mean).powi(2)).sum::<f64>();
+    }
+    assert!(spread[1] < 0.2 * spread[0], "{spread:?}");
+}
+
+#[test]
+fn awkward_skies_are_sampled_or_left_alone() {
+    let one = sky("sphere", picture(1, 1, |_| 2.0));
+    let black = sky("sphere", picture(8, 4, |_| 0.0));
+    let spike = sky("sphere", picture(64, 32, |i| if i == 700 { 1e8 } else { 0.0 }));
+    let at = facing(Vec3::Y);
+    for sky in [&one, &black, &spike] {
+        let light = light(sky, SkySampling::Product, 10.0);
+        let mut rng = TestRng::new(3);
+        let mut sum = 0.0;
+        for _ in 0..2000 {
+            let u = rng.vec2().to_array();
+            let Some(s) = light.sample_li(&at, u) else { continue };
+            assert!(s.pdf > 0.0 && s.wi.is_finite());
+            sum += f64::from(light.arriving(&s).luminance() * s.wi.dot(Vec3::Y).max(0.0) / s.pdf) / 2000.0;
+        }
+        assert!(sum.is_finite() && (sum > 0.0) == light.guided().is_some());
+    }
+    // A distribution of nothing is none.
+    assert!(Distribution1D::new([0.0; 3]).is_none());
+}

@@ -1,0 +1,132 @@
+//! Pixels that see nothing but what is behind everything: their filter's integral of it, instead of samples.
+//!
+//! The sky is looked up on a grid of 4 x 4 points a pixel, which neighbours share, and the filter laid over it one axis
+//! after the other: up to 144 points count for a pixel, of which it pays for 16 to 23. Half of the points, like the black
+//! fields of a chessboard, make an estimate by themselves and the other half another. Where the two differ by too much
+//! (the rim of a sun, stars, texels as large as pixels that differ wildly) the pixel is sampled as others are.
+
+use crate::base::camera::FilmSamples;
+use crate::base::pixel_rect::PixelRect;
+use crate::base::ray::RayBatch;
+use crate::color::Rgb;
+use crate::sampling::filter::PixelFilter;
+use crate::scene::Scene;
+use crate::scene::desc::Background;
+
+/// Points along each side of a pixel.
+const PER_PIXEL: usize = 4;
+/// Largest difference of the halves, over their mean, of a pixel that is taken: their mean is nearer to the truth than
+/// either, by a factor of four or more where the sky is at all smooth.
+const TOLERANCE: f32 = 2e-3;
+
+/// Works out pixels; keeps its room from tile to tile.
+#[derive(Default)]
+pub struct Backdrop {
+    x: Vec<f32>,
+    y: Vec<f32>,
+    rays: RayBatch,
+    li: Vec<Rgb>,
+    more: Vec<Rgb>,
+    /// After the first axis: sums of all points and sums with alternating signs.
+    rows: Vec<[Rgb; 2]>,
+    /// By pixel of the tile.
+    pixels: Vec<Option<Rgb>>,
+    rect: PixelRect,
+}
+
+/// The filter's weight of each point along one axis about a pixel, first to last, together 1; None where the filter's edge
+/// lies between points.
+fn taps(filter: PixelFilter) -> Option<Vec<f32>> {
+    let n = 2.0 * filter.radius() * PER_PIXEL as f32;
+    if n.fract() != 0.0 || n < 1.0 {
+        return None;
+    }
+    let n = n as usize;
+    let weight = |i: usize| filter.density(((i as f32 + 0.5) / n as f32 * 2.0 - 1.0) * filter.radius());
+    let sum: f32 = (0..n).map(weight).sum();
+    Some((0..n).map(|i| weight(i) / sum).collect())
+}
+
+impl Backdrop {
+    /// Works out the pixels of a rectangle; see [`Backdrop::get`].
+    pub fn fill(&mut self, scene: &Scene, filter: PixelFilter, rect: PixelRect) {
+        self.rect = rect;
+        self.pixels.clear();
+        match scene.background {
+            Background::Transparent => self.pixels.resize(rect.area(), Some(Rgb::BLACK)),
+            Background::Color(c) => self.pixels.resize(rect.area(), Some(Rgb::from(c))),
+            Background::Sky => match taps(filter) {
+                Some(taps) => self.fill_sky(scene, &taps, rect),
+                None => self.pixels.resize(rect.area(), None),
+            },
+        }
+    }
+
+    /// What a pixel of the rectangle shows; None where it must be sampled.
+    pub fn get(&self, x: u32, y: u32) -> Option<Rgb> {
+        self.pixels[self.rect.index(x, y)]
+    }
+
+    fn fill_sky(&mut self, scene: &Scene, taps: &[f32], rect: PixelRect) {
+        // The first point of the first pixel's filter, in points from the pixel's left edge.
+        let before = (taps.len() - PER_PIXEL) / 2;
+        let span = |pixels: u32| pixels as usize * PER_PIXEL + 2 * before;
+        let (w, h) = (span(rect.width()), span(rect.height()));
+        let place = |first: u32, i: usize| first as f32 + (i as f32 + 0.5 - before as f32) / PER_PIXEL as f32;
+        self.x.clear();
+        self.y.clear();
+        for j in 0..h {
+            self.x.extend((0..w).map(|i| place(rect.x0, i)));
+            self.y.extend(std::iter::repeat_n(place(rect.y0, j), w));
+        }
+        self.look_up(scene);
+        self.rows.clear();
+        for row in self.li.chunks_exact(w) {
+            for pixel in 0..rect.width() as usize {
+                self.rows.push(fold(taps, row[pixel * PER_PIXEL..].iter().map(|l| [*l; 2])));
+            }
+        }
+        let across = rect.width() as usize;
+        for pixel in 0..rect.height() as usize {
+            for column in 0..across {
+                let first = pixel * PER_PIXEL * across + column;
+                let [sum, apart] = fold(taps, self.rows[first..].iter().step_by(across).copied());
+                // The halves are the sum plus and minus what is apart.
+                let spread = apart.map(f32::abs).max_component() * 2.0;
+                let close = spread <= TOLERANCE * sum.map(f32::abs).max_component();
+                self.pixels.push(close.then_some(sum));
+            }
+        }
+    }
+
+    /// The radiance of all points.
+    fn look_up(&mut self, scene: &Scene) {
+        let n = self.x.len();
+        self.rays.resize(n);
+        scene
+            .camera
+            .fill_rays(&FilmSamples { x: &self.x, y: &self.y, lens_u: &[], lens_v: &[] }, &mut self.rays);
+        self.li.clear();
+        self.li.resize(n, Rgb::BLACK);
+        for (k, &light) in scene.lights.at_infinity.iter().enumerate() {
+            let light = &scene.lights.list[light as usize];
+            if k == 0 {
+                light.le_escaped(self.rays.directions(), &mut self.li);
+                continue;
+            }
+            self.more.resize(n, Rgb::BLACK);
+            light.le_escaped(self.rays.directions(), &mut self.more);
+            self.li.iter_mut().zip(&self.more).for_each(|(sum, &le)| *sum += le);
+        }
+    }
+}
+
+/// Weighted sums of the first of each pair, and of the second with alternating signs.
+fn fold(taps: &[f32], points: impl Iterator<Item = [Rgb; 2]>) -> [Rgb; 2] {
+    let mut sums = [Rgb::BLACK; 2];
+    for (i, (tap, [all, apart])) in taps.iter().zip(points).enumerate() {
+        sums[0] += all * *tap;
+        sums[1] += apart * if i % 2 == 0 { *tap } else { -*tap };
+    }
+    sums
+}
