@@ -24,6 +24,8 @@ from measure import EPSILON, Reference, write_record
 REFERENCE_SEED = 500_000
 # Samples of one picture of a reference: few enough for a peer that keeps all of them in memory.
 MOST_AT_ONCE = 1024
+# Samples that tell whether a pixel is wholly covered.
+ALPHA_SPP = 256
 
 
 class Scene:
@@ -103,7 +105,7 @@ def reference(peer, scene, a):
     series = peer.series()[0]
     spp = max(a.reference_spp // 2, 1)
     halves = [half(peer, series, spp, REFERENCE_SEED + i * 10_000) for i in range(2)]
-    made = Reference.of_halves(*halves, peer.alpha(min(a.reference_spp, MOST_AT_ONCE)), a.reference_spp)
+    made = Reference.of_halves(*halves, peer.alpha(min(a.reference_spp, ALPHA_SPP)), a.reference_spp)
     os.makedirs(folder, exist_ok=True)
     made.save(path)
     return made

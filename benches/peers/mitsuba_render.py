@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Renders one mesh under one equirectangular sky with Mitsuba 3, for comparison with skylit.
 
-    pip install mitsuba numpy OpenEXR
+    pip install mitsuba numpy
     python3 benches/peers/mitsuba_render.py MESH.ply SKY.exr -o out.exr [options]
 
 SKY.exr is equirectangular in skylit's convention (the middle column looks along +x); skylit writes such a picture of

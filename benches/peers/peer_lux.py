@@ -5,6 +5,7 @@
     python3 benches/peers/peer_lux.py DIR [SCENE ...] --json lux.json [options]
 """
 import os
+import sys
 import tempfile
 import time
 
@@ -21,10 +22,11 @@ class Lux:
 
     def __init__(self, threads):
         # First, as pyluxcore brings an allocator along that cannot free what libraries loaded later made with another.
-        import OpenEXR  # noqa: F401
+        import OpenEXR
         import pyluxcore
 
         self.lux, self.threads = pyluxcore, threads
+        self.plain = {"compression": OpenEXR.NO_COMPRESSION}
         pyluxcore.Init(lambda message: None)
         self.program = f"LuxCore {pyluxcore.Version()}"
         self.folder = tempfile.TemporaryDirectory()
@@ -48,7 +50,7 @@ class Lux:
             "scene.camera.lookat.orig": eye,
             "scene.camera.lookat.target": at,
             "scene.camera.up": up,
-            "scene.camera.fieldofview": self.fov(scene),
+            **self.window(scene),
             "scene.camera.lensradius": 0.0,
             "scene.camera.autofocus.enable": False,
             **self.sky(scene),
@@ -60,18 +62,24 @@ class Lux:
         self.scene.Parse(self.properties(table))
 
     @staticmethod
-    def fov(scene):
-        """Lux' angle of view is that of the picture's longer side; ours is upright."""
+    def window(scene):
+        """Lux' angle of view is that of the picture's longer side; ours is upright. Its rows stand one too low."""
         w, h = scene.size
-        tan = np.tan(np.radians(scene.camera["fov_deg"]) / 2)
-        return float(2 * np.degrees(np.arctan(tan * max(w / h, 1))))
+        long = max(w, h)
+        tan = np.tan(np.radians(scene.camera["fov_deg"]) / 2) * long / h
+        x, y, row = w / long, h / long, 2 / long
+        return {
+            "scene.camera.fieldofview": float(2 * np.degrees(np.arctan(tan))),
+            "scene.camera.autoupdate.screenwindow": False,
+            "scene.camera.screenwindow": [-x, x, -y - row, y - row],
+        }
 
     def sky(self, scene):
         """Lux' first column looks along +x, and its upright axis is z."""
         sky = scene.sky_picture()
         rolled = np.roll(sky, sky.shape[1] // 2, axis=1)
         path = os.path.join(self.folder.name, f"{scene.name}.exr")
-        write_exr(path, {c: rolled[..., i] for i, c in enumerate("RGB")})
+        write_exr(path, {c: rolled[..., i] for i, c in enumerate("RGB")}, self.plain)
         return {
             "scene.lights.sky.type": "infinite",
             "scene.lights.sky.file": path,
@@ -85,9 +93,9 @@ class Lux:
     @staticmethod
     def material(key, m):
         if m["type"] == "metal":
-            # Lux' metals have Schlick's facets; Disney's material has those of GGX, with alpha = roughness^2.
-            table = {"type": "disney", "basecolor": [m["color"]] * 3, "metallic": 1.0, "roughness": m["roughness"]}
-            table |= {"specular": 0.0, "speculartint": 0.0, "clearcoat": 0.0, "sheen": 0.0, "anisotropic": 0.0}
+            # Schlick's facets with squared widths are those of GGX, their masking is another. The index makes it white.
+            alpha = m["roughness"] ** 2
+            table = {"type": "metal2", "uroughness": alpha, "vroughness": alpha, "n": [0.001] * 3, "k": [50.0] * 3}
         else:
             table = {"type": "matte", "kd": [m["albedo"]] * 3}
         return {f"{key}.{k}": v for k, v in table.items()}
@@ -166,6 +174,9 @@ def main():
     except ImportError as e:
         missing("LuxCore", INSTALL, e)
     run(peer, a)
+    # All is written. Python's way out ends in a fault of pyluxcore's threads.
+    sys.stdout.flush()
+    os._exit(0)
 
 
 if __name__ == "__main__":

@@ -38,14 +38,14 @@ def material(m):
     return metal(m["roughness"]) if m["type"] == "metal" else diffuse(m["albedo"])
 
 
-def sensor(mi, camera, size, sampler, rfilter="box"):
+def sensor(mi, camera, size, sampler, rfilter="box", pixel_format="rgb"):
     to_world = mi.ScalarTransform4f().look_at(origin=camera["eye"], target=camera["look_at"], up=camera["up"])
     film = {
         "type": "hdrfilm",
         "width": size[0],
         "height": size[1],
         "rfilter": {"type": rfilter},
-        "pixel_format": "rgba",
+        "pixel_format": pixel_format,
         "component_format": "float32",
     }
     view = {"type": "perspective", "fov": camera["fov_deg"], "fov_axis": "y", "to_world": to_world}
@@ -105,30 +105,29 @@ class Mitsuba:
         mi = self.mi
         sampler = {"type": "multijitter", "sample_count": 4}
         view = sensor(mi, scene.camera, scene.size, sampler)
+        self.alpha_sensor = mi.load_dict(sensor(mi, scene.camera, scene.size, sampler, pixel_format="rgba"))
         sky = envmap(mi, scene.sky_picture())
         self.scene = mi.load_dict({"type": "scene", "sensor": view, "sky": sky, **shapes(mi, scene)})
         # The path integrator has no strategy but MIS.
-        strategies = {"mis": path(scene.max_depth)}
-        if scene.integrator == "direct":
+        if scene.integrator == "path":
+            strategies = {"mis": path(scene.max_depth)}
+        else:
             strategies = {"mis": direct(), "bsdf": direct(bsdf_only=True)}
-        integrators = {**strategies, "depth": {"type": "depth"}}
-        self.integrators = {name: mi.load_dict(i) for name, i in integrators.items()}
+        self.integrators = {name: mi.load_dict(i) for name, i in strategies.items()}
 
-    def image(self, name, spp, seed):
+    def render(self, series, spp, seed):
         """Everything is loaded and built, and kernels are compiled if the same was rendered before."""
+        integrator = self.integrators[series["settings"]["strategy"]]
         start = time.perf_counter()
-        image = self.mi.render(self.scene, integrator=self.integrators[name], spp=spp, seed=seed)
+        image = self.mi.render(self.scene, integrator=integrator, spp=spp, seed=seed)
         self.dr.eval(image)
         self.dr.sync_thread()
         return time.perf_counter() - start, np.array(image)
 
-    def render(self, series, spp, seed):
-        seconds, image = self.image(series["settings"]["strategy"], spp, seed)
-        return seconds, image[..., :3]
-
     def alpha(self, spp):
         # The other integrators count the sky as covered.
-        return self.image("depth", spp, 0)[1][..., 3]
+        depth = self.mi.load_dict({"type": "depth"})
+        return np.array(self.mi.render(self.scene, sensor=self.alpha_sensor, integrator=depth, spp=spp))[..., 3]
 
 
 def main():
