@@ -82,7 +82,7 @@ fn main() -> ExitCode {
 fn measure(case: &'static cases::Case, renders: usize) -> Row {
     let start = Instant::now();
     let threads = rayon::current_num_threads();
-    let prepared = Prepared::new(case, threads);
+    let prepared = Prepared::new(case, threads, 1);
     // Small pictures: a render a thread.
     let runs: Vec<Run> = (0..renders as u64)
         .into_par_iter()

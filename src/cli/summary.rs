@@ -1,5 +1,6 @@
 //! What a render took: for people on stderr, and as JSON.
 
+use super::rounds::Rounds;
 use crate::error::{Error, Result};
 use crate::memory::{self, in_words};
 use crate::render::Rendered;
@@ -96,6 +97,8 @@ pub struct Record {
     pub seconds: Seconds,
     samples: u64,
     msamples_per_second: f64,
+    /// Where a clock or a target decided.
+    rounds: Option<Rounds>,
     rays: Rays,
     memory: Memory,
     dropped_samples: u64,
@@ -128,6 +131,7 @@ impl Record {
             },
             samples: stats.samples,
             msamples_per_second: per_second(stats.samples),
+            rounds: Rounds::new(rendered, settings),
             rays: Rays {
                 camera: rays.camera,
                 scattered: rays.scattered,
@@ -161,7 +165,7 @@ impl Record {
     pub fn metadata(&self) -> Vec<(String, String)> {
         let v = &self.versions;
         let pair = |k: &str, v: String| (k.to_owned(), v);
-        vec![
+        let mut pairs = vec![
             pair("software", format!("skylit {} ({})", v.skylit, v.commit)),
             pair("command", self.command.join(" ")),
             pair("kernel", v.kernel.clone()),
@@ -169,7 +173,9 @@ impl Record {
             pair("seed", self.seed.to_string()),
             pair("sampler", self.sampler.to_owned()),
             pair("filter", self.filter.to_owned()),
-        ]
+        ];
+        pairs.extend(self.rounds.iter().flat_map(Rounds::pairs));
+        pairs
     }
 
     /// The record as JSON text.
@@ -234,6 +240,9 @@ impl fmt::Display for Record {
             self.msamples_per_second,
             plural(self.threads as u64, "thread")
         )?;
+        if let Some(rounds) = &self.rounds {
+            write!(f, "{rounds}")?;
+        }
         let r = &self.rays;
         writeln!(
             f,

@@ -144,11 +144,17 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    pub fn new(case: &'static Case, threads: usize) -> Prepared {
-        let text = format!("[film]\nsize = [{0}, {0}]\n", case.side) + &(case.scene)();
+    /// Its reference has the case's samples over `divisor`.
+    pub fn new(case: &'static Case, threads: usize, divisor: u32) -> Prepared {
+        Prepared::of_side(case, case.side, threads, divisor)
+    }
+
+    /// With other sides than the case's.
+    pub fn of_side(case: &'static Case, side: u32, threads: usize, divisor: u32) -> Prepared {
+        let text = format!("[film]\nsize = [{side}, {side}]\n") + &(case.scene)();
         let scene = scene(&text);
         let settings =
-            RenderSettings { spp: case.reference_spp, seed: u64::MAX, threads, ..settings(&scene) };
+            RenderSettings { spp: case.reference_spp / divisor, seed: u64::MAX, threads, ..settings(&scene) };
         let renderer = Renderer { integrator: integrator(case.kind, case.reference_params), settings };
         let film = renderer.render(&scene, &Silent).unwrap().film;
         let pixels = || film.window().pixels();
