@@ -61,9 +61,7 @@ pub fn needs(film: &Film, tiles: &[Tile], floor: f64) -> Vec<Need> {
         .collect();
     let surprises: Vec<f64> = rates.iter().zip(&usual).map(|(rate, usual)| rate - usual).collect();
     let shared: Vec<f64> = around.mean(&surprises).collect();
-    (0..tiles.len())
-        .map(|i| Need { own: own[i], rate: usual[i] + shared[i] * tiles[i].area })
-        .collect()
+    (0..tiles.len()).map(|i| Need { own: own[i], rate: usual[i] + shared[i] * tiles[i].area }).collect()
 }
 
 /// The 3 x 3 tiles around each.

@@ -298,8 +298,7 @@ impl Schedule {
     /// All blocks that are not good enough.
     fn failing_blocks(&self, target: &Target, needs: &[Need]) -> Vec<usize> {
         let z = self.deviate_of_blocks(target);
-        let fails =
-            |i: &usize| block_error(&self.tiles[*i], &needs[*i], z)[1].sqrt() > target.error;
+        let fails = |i: &usize| block_error(&self.tiles[*i], &needs[*i], z)[1].sqrt() > target.error;
         (0..self.tiles.len()).filter(|&i| self.tiles[i].spp < self.limit).filter(fails).collect()
     }
 

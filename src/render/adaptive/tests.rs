@@ -7,7 +7,8 @@ use crate::testing::TestRng;
 
 /// A film of 16 x 16 tiles whose pixels have the halves that `halves` says, of one sample each.
 fn film(across: u32, mut halves: impl FnMut(u32, u32) -> [f32; 2]) -> Film {
-    let mut film = Film::new(across * TILE_SIDE, TILE_SIDE, PixelRect::of_size(across * TILE_SIDE, TILE_SIDE));
+    let mut film =
+        Film::new(across * TILE_SIDE, TILE_SIDE, PixelRect::of_size(across * TILE_SIDE, TILE_SIDE));
     let rects: Vec<PixelRect> = film.tiles().collect();
     let mut tile = FilmTile::new(rects[0]);
     for rect in rects {

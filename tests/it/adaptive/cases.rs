@@ -55,7 +55,10 @@ fn room() -> String {
         + "[materials.lamp]\ntype = \"emissive\"\nradiance = 20\ntwo_sided = true\n"
         + "[materials.red]\ntype = \"diffuse\"\nalbedo = [0.6, 0.05, 0.05]\n"
         + &object("type = \"box\", min = [-1, 0, -2], max = [1, 2, 2]", "clay")
-        + &object("type = \"rectangle\", center = [0, 1.95, 0], edge_u = [0.4, 0, 0], edge_v = [0, 0, 0.4]", "lamp")
+        + &object(
+            "type = \"rectangle\", center = [0, 1.95, 0], edge_u = [0.4, 0, 0], edge_v = [0, 0, 0.4]",
+            "lamp",
+        )
         + &object("type = \"box\", min = [-0.8, 0, -1], max = [-0.1, 1.1, -0.3]", "red")
 }
 
@@ -65,7 +68,10 @@ fn needle() -> String {
     head("[0, 1.5, 0]", "[0, 0, 0.001]", 60, "type = \"constant\"")
         + "[materials.lamp]\ntype = \"emissive\"\nradiance = 1500\n"
         + &object(FLOOR, "clay")
-        + &object("type = \"rectangle\", center = [0.1, 0.2, 0.2], edge_u = [0.0173, 0, 0], edge_v = [0, 0, 0.0173]", "lamp")
+        + &object(
+            "type = \"rectangle\", center = [0.1, 0.2, 0.2], edge_u = [0.0173, 0, 0], edge_v = [0, 0, 0.0173]",
+            "lamp",
+        )
 }
 
 /// A glass ball that throws the light of a lamp on the floor: bright paths that only chance finds.

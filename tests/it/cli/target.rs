@@ -26,9 +26,14 @@ fn what_makes_no_target_is_refused() {
 fn a_target_that_cannot_be_met_ends_at_max_spp_and_says_so() {
     let f = Folder::new();
     for error in ["0", "1e-9"] {
-        let command = format!("render scene.toml -o a.exr --stats s.json --target-error {error} --max-spp 40");
+        let command =
+            format!("render scene.toml -o a.exr --stats s.json --target-error {error} --max-spp 40");
         let run = f.run(&command).succeeds();
-        assert!(run.stderr.contains("was not met") && run.stderr.contains("40 samples a pixel"), "{}", run.stderr);
+        assert!(
+            run.stderr.contains("was not met") && run.stderr.contains("40 samples a pixel"),
+            "{}",
+            run.stderr
+        );
         let rounds = &f.json("s.json")["rounds"];
         assert_eq!(rounds["target"]["met"], false);
         assert_eq!((&rounds["spp_max"], &rounds["rounds"]), (&40.into(), &4.into()));
