@@ -181,6 +181,19 @@ impl FromStr for Background {
     }
 }
 
+/// A share: `1%` or `0.01`, from 0 to 1.
+pub fn share(s: &str) -> Result<f64, String> {
+    let read = match s.strip_suffix('%') {
+        Some(percent) => percent.trim_end().parse().map(|v: f64| v / 100.0),
+        None => s.parse(),
+    };
+    match read {
+        Ok(v) if (0.0..=1.0).contains(&v) => Ok(v),
+        Ok(v) if v > 1.0 && v <= 100.0 && !s.ends_with('%') => Err(format!("is more than 1: {s}% is meant?")),
+        _ => Err("takes a share such as 1% or 0.01, from 0 to 100%".into()),
+    }
+}
+
 /// A finite number within `range`.
 pub fn number_in(s: &str, range: std::ops::RangeInclusive<f64>) -> Result<f64, String> {
     match s.parse() {
@@ -206,6 +219,8 @@ mod tests {
         assert_eq!(duration("1.5h"), Ok(Duration::from_secs(5400)));
         assert_eq!(duration("500ms"), Ok(Duration::from_millis(500)));
         assert!(["", "s", "0s", "-3s", "3d", "nans", "1e400", "inf"].iter().all(|s| duration(s).is_err()));
+        assert_eq!(["1%", "0.01", "0", "100%"].map(share), [Ok(0.01), Ok(0.01), Ok(0.0), Ok(1.0)]);
+        assert!(["-1%", "nan", "nan%", "101%", "5", "1e3%", "%", "", "x"].iter().all(|s| share(s).is_err()));
         assert_eq!(
             [amount("300k", 1..=9_000_000), amount("1.5M", 1..=9_000_000)],
             [Ok(300_000), Ok(1_500_000)]

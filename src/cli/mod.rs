@@ -13,9 +13,11 @@ mod manual;
 mod output;
 mod progress;
 mod render;
+mod rounds;
 mod scene_args;
 mod sky_arg;
 mod summary;
+mod target_args;
 
 use crate::error::{Error, Result};
 use crate::memory;

@@ -1,9 +1,12 @@
 //! The progress bar: what is done, time left, samples per second. Drawn on a terminal alone.
 
+use super::target_args::percent;
 use crate::render::Progress;
+use crate::render::adaptive::Reached;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::fmt::Write;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Shows a render's progress.
@@ -13,6 +16,8 @@ pub struct Bar {
     started: Instant,
     /// With a limit the bar counts time, since nobody knows how many samples that will be.
     limit: Option<Duration>,
+    /// What a render to a target has come to.
+    error: Mutex<String>,
 }
 
 /// Often enough to look alive, seldom enough to cost nothing.
@@ -27,7 +32,7 @@ impl Bar {
             ProgressDrawTarget::stderr_with_hz(DRAWS_PER_SECOND)
         };
         let bar = ProgressBar::with_draw_target(None, target);
-        Bar { bar, done: AtomicU64::new(0), started: Instant::now(), limit }
+        Bar { bar, done: AtomicU64::new(0), started: Instant::now(), limit, error: Mutex::default() }
     }
 
     /// Takes it off the screen.
@@ -65,6 +70,18 @@ impl Progress for Bar {
             Some(_) => self.bar.set_position(self.started.elapsed().as_millis() as u64),
             None => self.bar.set_position(done),
         }
-        self.bar.set_message(self.rate());
+        let error = self.error.lock().unwrap_or_else(PoisonError::into_inner);
+        self.bar.set_message(self.rate() + &error);
+    }
+
+    fn reached(&self, reached: &Reached, target: f64) {
+        let text = format!(", error {} of {}", percent(reached.at_most), percent(target));
+        *self.error.lock().unwrap_or_else(PoisonError::into_inner) = text;
+        if self.limit.is_none() && target > 0.0 {
+            // The squared error falls as the samples grow.
+            let done = self.done.load(Ordering::Relaxed);
+            let needed = done as f64 * (reached.at_most / target).powi(2).max(1.0);
+            self.bar.set_length(needed as u64);
+        }
     }
 }

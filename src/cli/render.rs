@@ -5,6 +5,7 @@ use super::output::{OutputArgs, OutputPlan, PictureInfo};
 use super::progress::Bar;
 use super::scene_args::SceneArgs;
 use super::summary::Record;
+use super::target_args::{TargetArgs, TargetPlan, warn_if_missed};
 use super::{Setting, interrupt};
 use crate::base::intersectable::{BuildQuality, KernelMode, KernelOptions};
 use crate::base::registry::{self, Node, Value};
@@ -46,9 +47,12 @@ struct SamplingArgs {
     /// Samples a pixel [default: 64]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     spp: Option<u32>,
-    /// Start rounds of samples until so much time has passed, such as 60s or 5m (at most --spp samples, if given)
+    /// Start rounds of samples, where they lower the error most, until so much time has passed, such as 60s or 5m (at
+    /// most --spp samples, if given)
     #[arg(long, value_name = "TIME", value_parser = duration)]
     time: Option<Duration>,
+    #[command(flatten)]
+    target: TargetArgs,
     /// What is estimated along each path (see `skylit list integrator`) [default: path]
     #[arg(long, value_name = "NAME")]
     integrator: Option<String>,
@@ -136,6 +140,8 @@ pub fn run(args: &RenderArgs, setting: &Setting) -> Result<()> {
     let rendered = renderer.render(&scene, &bar);
     bar.finish();
     let rendered = rendered?;
+    let stats = &rendered.stats;
+    warn_if_missed(renderer.settings.target.as_ref(), stats.reached.as_ref(), stats.spp);
     let mut record = Record::new(&args.scene.input, &scene, &rendered, &renderer.settings);
     let info = PictureInfo { background: scene.background, transfer, metadata: record.metadata() };
     interrupt::hold_off(|| {
@@ -156,6 +162,7 @@ pub fn run(args: &RenderArgs, setting: &Setting) -> Result<()> {
 /// What was looked up before anything was loaded.
 struct Plan {
     output: OutputPlan,
+    target: Option<TargetPlan>,
     sampler: Option<Sampler>,
     filter: Option<PixelFilter>,
 }
@@ -176,10 +183,12 @@ impl RenderArgs {
         if let Some(CropWindow(window)) = s.cropwindow {
             crop_window(window, [MAX_SIDE; 2])?;
         }
+        let target = s.target.plan(s.spp)?;
         let output = self.output.check()?;
         self.stats.as_deref().map_or(Ok(()), check_file)?;
         Ok(Plan {
             output,
+            target,
             sampler: s.sampler.as_deref().map(str::parse).transpose()?,
             filter: s.filter.as_deref().map(str::parse).transpose()?,
         })
@@ -191,11 +200,16 @@ impl SamplingArgs {
     fn settings(&self, scene: &SceneDesc, plan: &Plan, threads: usize) -> Result<RenderSettings> {
         let usual = RenderSettings::of_scene(scene)?;
         let crop = self.cropwindow.map(|CropWindow(w)| crop_window(w, usual.size)).transpose()?;
-        // With a time limit the clock rules, unless the command line says otherwise.
-        let usual_spp = if self.time.is_some() { u32::MAX } else { usual.spp };
+        // With a target or a time limit these rule, unless the command line says otherwise.
+        let usual_spp = match (&plan.target, self.time) {
+            (Some(target), _) => target.max_spp,
+            (None, Some(_)) => u32::MAX,
+            (None, None) => usual.spp,
+        };
         Ok(RenderSettings {
             crop: crop.unwrap_or(usual.crop),
             spp: self.spp.unwrap_or(usual_spp),
+            target: plan.target.map(|t| t.target),
             time: self.time,
             seed: self.seed.unwrap_or(usual.seed),
             sampler: plan.sampler.unwrap_or(usual.sampler),
@@ -241,7 +255,12 @@ fn named(kind: &str) -> Node {
 fn expected_rays(s: &RenderSettings) -> u64 {
     /// A camera ray, a shadow ray, and a bounce where something is hit.
     const RAYS_A_SAMPLE: u64 = 2;
-    let samples = s.crop.area() as u64 * u64::from(s.spp);
+    let spp = match s.target {
+        // As if a sample's error were as large as what it shows.
+        Some(target) => s.spp.min(target.error.powi(-2) as u32),
+        None => s.spp,
+    };
+    let samples = s.crop.area() as u64 * u64::from(spp);
     let samples = match s.time {
         Some(time) => samples.min((time.as_secs_f64() * 1e6) as u64 * s.threads as u64),
         None => samples,

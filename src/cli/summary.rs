@@ -1,5 +1,6 @@
 //! What a render took: for people on stderr, and as JSON.
 
+use super::rounds::Rounds;
 use crate::error::{Error, Result};
 use crate::memory::{self, in_words};
 use crate::render::Rendered;
@@ -105,6 +106,8 @@ pub struct Record {
     /// Pixels that no geometry projects into, and their samples that needed no ray.
     skipped: Skipped,
     msamples_per_second: f64,
+    /// Where a clock or a target decided.
+    rounds: Option<Rounds>,
     rays: Rays,
     /// What the integrator decided beforehand.
     decided: String,
@@ -140,6 +143,7 @@ impl Record {
             samples: stats.samples,
             skipped: Skipped { pixels: stats.free_pixels, samples: stats.spared },
             msamples_per_second: per_second(stats.samples),
+            rounds: Rounds::new(rendered, settings),
             rays: Rays {
                 camera: rays.camera,
                 scattered: rays.scattered,
@@ -174,7 +178,7 @@ impl Record {
     pub fn metadata(&self) -> Vec<(String, String)> {
         let v = &self.versions;
         let pair = |k: &str, v: String| (k.to_owned(), v);
-        vec![
+        let mut pairs = vec![
             pair("software", format!("skylit {} ({})", v.skylit, v.commit)),
             pair("command", self.command.join(" ")),
             pair("kernel", v.kernel.clone()),
@@ -183,7 +187,9 @@ impl Record {
             pair("sampler", self.sampler.to_owned()),
             pair("filter", self.filter.to_owned()),
             pair("chosen", self.decided.clone()),
-        ]
+        ];
+        pairs.extend(self.rounds.iter().flat_map(Rounds::pairs));
+        pairs
     }
 
     /// The record as JSON text.
@@ -248,6 +254,9 @@ impl fmt::Display for Record {
             self.msamples_per_second,
             plural(self.threads as u64, "thread")
         )?;
+        if let Some(rounds) = &self.rounds {
+            write!(f, "{rounds}")?;
+        }
         let r = &self.rays;
         writeln!(
             f,

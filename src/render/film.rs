@@ -127,6 +127,15 @@ pub struct TileEstimate {
     pub variance: f64,
 }
 
+/// Half of a pixel's samples: the even or the odd replicates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Half {
+    /// Mean radiance by channel.
+    pub mean: [f64; 3],
+    /// Samples, at least 1.
+    pub count: u64,
+}
+
 /// What happened to samples on the way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FilmCounts {
@@ -237,6 +246,16 @@ impl Film {
     /// Samples of a pixel in the window.
     pub fn sample_count(&self, x: u32, y: u32) -> u64 {
         self.pixels[self.window.index(x, y)].count()
+    }
+
+    /// A pixel's two half-buffers, which are independent of each other; `None` where one has no sample.
+    pub fn halves(&self, x: u32, y: u32) -> Option<[Half; 2]> {
+        let pixel = &self.pixels[self.window.index(x, y)];
+        let half = |h: usize| {
+            let count = u64::from(pixel.counts[h]);
+            Half { mean: pixel.halves[h].map(|sum| mean_of(sum, count)), count }
+        };
+        pixel.counts.iter().all(|&n| n > 0).then(|| [half(0), half(1)])
     }
 
     /// The means as planes `R G B A`, without metadata.

@@ -1,5 +1,6 @@
 //! L4: how a scene becomes a film: the [`Renderer`] deals blocks of pixels to threads, round by round.
 
+pub mod adaptive;
 pub mod aov;
 mod backdrop;
 pub mod block;
@@ -10,20 +11,20 @@ pub mod fixed;
 pub mod layers;
 pub mod settings;
 
-use crate::base::pixel_rect::PixelRect;
 use crate::error::{Error, Result};
 use crate::integrators::{Integrator, PilotPlan, RayCounts, Specialised};
 use crate::memory;
 use crate::scene::Scene;
+use adaptive::{Reached, Schedule, Task};
 use block::{BadSample, Job, Worker};
 use coverage::Coverage;
-use film::{Film, REPLICATES};
+use film::Film;
 use layers::Layers;
 use rayon::prelude::*;
 use settings::RenderSettings;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Told of a render's progress from its worker threads, and asked whether to go on.
 pub trait Progress: Sync {
@@ -32,6 +33,9 @@ pub trait Progress: Sync {
 
     /// So many more have been taken.
     fn advance(&self, _samples: u64) {}
+
+    /// After a round: how good the picture is, where a target error is to be met.
+    fn reached(&self, _error: &Reached, _target: f64) {}
 
     /// Whether the render shall stop with what it has; asked once a tile.
     fn should_stop(&self) -> bool {
@@ -59,8 +63,14 @@ pub struct Rendered {
 pub struct RenderStats {
     /// Seconds from the first ray to the last.
     pub seconds: f64,
-    /// Samples a pixel in the film.
+    /// Samples a pixel in the film, the most.
     pub spp: u32,
+    /// The fewest; fewer where samples went by need.
+    pub spp_least: u32,
+    /// Rounds begun: 1, unless a clock or a target decides.
+    pub rounds: u32,
+    /// How good the picture is, where there was a target.
+    pub reached: Option<Reached>,
     /// Samples taken.
     pub samples: u64,
     /// Rays by kind.
@@ -135,18 +145,29 @@ impl Renderer {
         out.stats.free_pixels = coverage.as_ref().map_or(0, |c| c.free() as u64);
         let job = Job { coverage: coverage.as_ref(), ..Job::new(scene, integrator.as_ref(), s) };
         let workers = Mutex::new(Vec::<Worker>::new());
-        let mut done = 0;
-        while done < s.spp && s.time.is_none_or(|t| done == 0 || start.elapsed() < t) {
-            let end = done + round_size(done, s.time).min(s.spp - done);
-            let interrupted = render_round(&job, done..end, &workers, &mut out, progress)?;
-            done = end;
-            if interrupted {
-                out.stats.interrupted = true;
+        let mut schedule = Schedule::new(s, &out.film, out.stats.free_pixels);
+        let in_time = |rounds: u32| s.time.is_none_or(|t| rounds == 0 || start.elapsed() < t);
+        while in_time(schedule.rounds) && !out.stats.interrupted {
+            let tasks = schedule.next(&out.film);
+            if let (Some(reached), Some(target)) = (&schedule.reached, &s.target) {
+                progress.reached(reached, target.error);
+            }
+            if tasks.is_empty() {
                 break;
             }
+            let rays = render_round(&job, &tasks, &workers, &mut out, progress)?;
+            for (task, rays) in tasks.iter().zip(rays) {
+                match rays {
+                    Some(rays) => schedule.done(task, rays),
+                    None => out.stats.interrupted = true,
+                }
+            }
         }
+        schedule.look(&out.film);
         let stats = &mut out.stats;
-        stats.spp = done;
+        [stats.spp_least, stats.spp] = schedule.spp_range();
+        stats.rounds = schedule.rounds;
+        stats.reached = schedule.reached;
         stats.seconds = start.elapsed().as_secs_f64();
         for w in lock(&workers).drain(..) {
             stats.rays.add(&w.work.counts);
@@ -162,48 +183,39 @@ impl Renderer {
     }
 }
 
-/// One round over all tiles; says whether it was stopped on the way.
+/// One round; the rays that each task took, `None` for those that were stopped before they began.
 fn render_round(
     job: &Job,
-    range: std::ops::Range<u32>,
+    tasks: &[Task],
     workers: &Mutex<Vec<Worker>>,
     out: &mut Rendered,
     progress: &dyn Progress,
-) -> Result<bool> {
+) -> Result<Vec<Option<u64>>> {
     let stopped = AtomicBool::new(false);
     let sums = Mutex::new((&mut out.film, &mut out.layers));
-    let samples = u64::from(range.end - range.start);
-    let tiles: Vec<PixelRect> = lock(&sums).0.tiles().collect();
-    tiles.into_par_iter().with_max_len(1).try_for_each(|rect| {
+    let run = |task: &Task| {
         if stopped.load(Ordering::Relaxed) || progress.should_stop() {
             stopped.store(true, Ordering::Relaxed);
-            return Ok(());
+            return Ok(None);
         }
         let idle = lock(workers).pop();
         let mut worker = idle.unwrap_or_else(|| Worker::new(job.settings));
-        worker.render_tile(job, rect, range.clone());
+        let before = worker.work.counts.total();
+        worker.render_tile(job, task.rect, task.samples.clone());
         job.scene.kernel.take_failure()?;
+        let rays = worker.work.counts.total() - before;
         let mut sums = lock(&sums);
         sums.0.add_tile(&worker.film);
         sums.1.merge(&worker.layers);
         drop(sums);
         lock(workers).push(worker);
-        progress.advance(rect.area() as u64 * samples);
-        Ok::<(), Error>(())
-    })?;
-    Ok(stopped.into_inner())
+        progress.advance(task.rect.area() as u64 * u64::from(task.samples.end - task.samples.start));
+        Ok(Some(rays))
+    };
+    tasks.par_iter().with_max_len(1).map(run).collect()
 }
 
 /// A panic elsewhere has already failed the render; the data behind the lock is sums, which stay sums.
 fn lock<T>(m: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
     m.lock().unwrap_or_else(|e| e.into_inner())
-}
-
-/// Without a clock one round does it all. With one, rounds double, so that the count stays a power of two times
-/// the replicates as long as possible, where the points are best.
-fn round_size(done: u32, time: Option<Duration>) -> u32 {
-    match time {
-        None => u32::MAX,
-        Some(_) => done.max(4 * REPLICATES as u32),
-    }
 }

@@ -2,6 +2,7 @@
 
 use crate::base::pixel_rect::PixelRect;
 use crate::error::{Error, Result};
+use crate::render::adaptive::Target;
 use crate::render::aov::AovRow;
 use crate::sampler::Sampler;
 use crate::sampling::filter::PixelFilter;
@@ -15,8 +16,10 @@ pub struct RenderSettings {
     pub size: [u32; 2],
     /// The part of the film that is rendered, pixels; all of it by default.
     pub crop: PixelRect,
-    /// Samples a pixel, at least 1; with a time limit, at most so many.
+    /// Samples a pixel, at least 1; with a time limit or a target, at most so many.
     pub spp: u32,
+    /// Samples are taken until the picture is so good.
+    pub target: Option<Target>,
     /// Rounds are started only while less than this has passed; the picture says how many samples it has.
     pub time: Option<Duration>,
     /// Seed of every random choice.
@@ -59,6 +62,7 @@ impl RenderSettings {
             size,
             crop: PixelRect::of_size(size[0], size[1]),
             spp: 64,
+            target: None,
             time: None,
             seed: 0,
             sampler: Sampler::default(),
@@ -92,6 +96,6 @@ impl RenderSettings {
         if self.spp == 0 {
             return Err(Error::Usage("at least one sample a pixel is needed (--spp 1)".into()));
         }
-        Ok(())
+        self.target.map_or(Ok(()), |t| t.check())
     }
 }

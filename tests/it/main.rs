@@ -1,5 +1,6 @@
 //! The one integration-test binary: a module a subject.
 
+mod adaptive;
 mod bad_geometry;
 mod bad_scenes;
 mod classic;

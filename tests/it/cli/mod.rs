@@ -6,6 +6,7 @@ mod crosscheck;
 mod folder;
 #[cfg(target_os = "linux")]
 mod memory;
+mod target;
 
 use folder::{Folder, QUICK};
 #[cfg(unix)]
