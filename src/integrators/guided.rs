@@ -1,8 +1,9 @@
 //! Surfaces below a light that takes them into account.
 
 use super::Workspace;
+use super::depth::Block;
 use super::light_dim;
-use super::path::{Block, PathScratch, PathTracer};
+use super::path::{PathScratch, PathTracer};
 use super::strategy::Strategy;
 use super::surface::Surface;
 use crate::base::light::{ChosenLight, GuidedLight, Lobes};

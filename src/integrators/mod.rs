@@ -3,6 +3,7 @@
 
 pub mod ambient_occlusion;
 pub mod analytic;
+mod depth;
 pub mod direct;
 mod escapes;
 mod guided;

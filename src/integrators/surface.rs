@@ -4,7 +4,8 @@
 //! need. By itself it is no faster than one point after the other (measured).
 
 use super::Workspace;
-use super::path::{Block, PathScratch, PathState, PathTracer};
+use super::depth::Block;
+use super::path::{PathScratch, PathState, PathTracer};
 use super::pending::Pending;
 use super::points::VertexPoint;
 use super::{PathId, light_dim};

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod bench;
+mod bench_error;
 mod crosscheck;
 mod folder;
 #[cfg(target_os = "linux")]
