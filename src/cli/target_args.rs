@@ -62,17 +62,16 @@ impl TargetArgs {
 
 /// Says so if a target was not met.
 pub fn warn_if_missed(target: Option<&Target>, reached: Option<&Reached>, most_spp: u32) {
-    if let (Some(target), Some(reached)) = (target, reached) {
-        if !reached.met {
-            log::warn!(
-                "the target error of {} was not met: {} after at most {most_spp} samples a pixel, and less than {} \
-                 with {} confidence (--max-spp allows more samples)",
-                percent(target.error),
-                percent(reached.error),
-                percent(reached.at_most),
-                percent(target.confidence),
-            );
-        }
+    let (Some(target), Some(reached)) = (target, reached) else { return };
+    if !reached.met {
+        log::warn!(
+            "the target error of {} was not met: {} after at most {most_spp} samples a pixel, and less than {} with {} \
+             confidence (--max-spp allows more samples)",
+            percent(target.error),
+            percent(reached.error),
+            percent(reached.at_most),
+            percent(target.confidence),
+        );
     }
 }
 
