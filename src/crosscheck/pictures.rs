@@ -74,6 +74,8 @@ pub fn differing(a: &Film, b: &Film, marked: &HashSet<[u32; 2]>) -> (Vec<[u32; 2
 pub(super) fn render(scene: &Scene, plan: &Plan, progress: &dyn Progress) -> Result<Film> {
     let mut settings = plan.settings.clone();
     settings.time = None;
+    // Every sample has the rays that were compared, by the integrator as it is.
+    (settings.skip_background, settings.pilot) = (false, false);
     let renderer = Renderer { integrator: Arc::clone(&plan.integrator), settings };
     Ok(renderer.render(scene, &Onward(progress))?.film)
 }

@@ -132,7 +132,8 @@ impl Renderer {
             stats: RenderStats::default(),
         };
         let plan = PilotPlan { pixels: crop, spp: s.spp, seed: s.seed, kind: s.sampler };
-        let integrator = match self.integrator.specialise(scene, &plan) {
+        let adapted = if s.pilot { self.integrator.specialise(scene, &plan) } else { None };
+        let integrator = match adapted {
             Some(Specialised { integrator, decided, rays }) => {
                 (out.stats.decided, out.stats.pilot) = (decided, rays);
                 integrator

@@ -31,6 +31,8 @@ pub struct RenderSettings {
     /// Whether pixels that no geometry projects into get the filter's integral of what is behind everything, where that
     /// is known to a thousandth, instead of samples.
     pub skip_background: bool,
+    /// Whether the integrator may try out beforehand what suits the scene.
+    pub pilot: bool,
     /// Worker threads, at least 1.
     pub threads: usize,
     /// Further layers.
@@ -68,6 +70,7 @@ impl RenderSettings {
             sampler: Sampler::default(),
             filter: PixelFilter::default(),
             skip_background: true,
+            pilot: true,
             threads: std::thread::available_parallelism().map_or(1, |n| n.get()),
             aovs: Vec::new(),
         }

@@ -53,6 +53,16 @@ pub fn render(scene: &Scene, integrator: std::sync::Arc<dyn integrators::Integra
     Renderer { integrator, settings }.render(scene, &Silent).unwrap()
 }
 
+/// As [`render`], with a ray for every sample: which pixels are known to see nothing depends on how boxes are nested.
+pub fn render_rays(
+    scene: &Scene,
+    integrator: std::sync::Arc<dyn integrators::Integrator>,
+    spp: u32,
+) -> Rendered {
+    let settings = RenderSettings { spp, threads: 2, skip_background: false, ..settings(scene) };
+    Renderer { integrator, settings }.render(scene, &Silent).unwrap()
+}
+
 /// Settings for the film that the scene's camera fills.
 pub fn settings(scene: &Scene) -> RenderSettings {
     RenderSettings::new([scene.film.width, scene.film.height])

@@ -1,6 +1,6 @@
 //! Placement, precision and spawned rays, on whole scenes.
 
-use crate::common::{build_on, describe, integrator, render, scene_on};
+use crate::common::{build_on, describe, integrator, render, render_rays, scene_on};
 use glam::{DAffine3, DVec3};
 use skylit::check::spawn::spawned;
 use skylit::render::Rendered;
@@ -95,7 +95,7 @@ fn nesting_renders_as_its_flattened_twin() {
         for backend in backends() {
             let twins = [nested.clone(), flattened(nested.clone())].map(|d| build_on(backend, d));
             assert_eq!(twins.each_ref().map(|s| s.geometry.depth()), [4, 1]);
-            let [a, b] = twins.map(|s| render(&s, integrator("path", &[("max_depth", 2.0)]), 4));
+            let [a, b] = twins.map(|s| render_rays(&s, integrator("path", &[("max_depth", 2.0)]), 4));
             let seen = a.film.window().pixels().filter(|&(x, y)| a.film.alpha(x, y) > 0.0).count();
             assert!(seen > 150, "{what}: {seen} pixels show anything");
             // Points agree to f32 rounding, so shadow rays that graze an edge may fall to either side: a few pixels.

@@ -8,10 +8,10 @@ use std::str::FromStr;
 pub enum SkySampling {
     /// By the luminance times what the surface makes of it, in coarse cells. A constant sky is left to BSDF
     /// sampling.
-    #[default]
     Product,
     /// By the luminance that rises above the average, where that pays: BSDF sampling finds the rest as well (Karlik et
     /// al. 2019). Under a constant sky nothing is left and there is no sample.
+    #[default]
     Compensated,
     /// By luminance.
     Table,
@@ -22,8 +22,8 @@ pub enum SkySampling {
 impl SkySampling {
     /// All methods with their names, as scene files spell them.
     pub const NAMES: [(&'static str, SkySampling); 4] = [
-        ("product", SkySampling::Product),
         ("compensated", SkySampling::Compensated),
+        ("product", SkySampling::Product),
         ("table", SkySampling::Table),
         ("cosine", SkySampling::Cosine),
     ];

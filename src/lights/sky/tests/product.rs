@@ -1,7 +1,6 @@
 //! Product sampling as integrators use it: prepared for a surface that scatters in some way.
 
 use super::*;
-use crate::sampling::distribution::Distribution1D;
 
 const SCATTERINGS: [Scattering; 4] = [
     Scattering::EVEN,
@@ -171,6 +170,4 @@ fn awkward_skies_are_sampled_or_left_alone() {
         }
         assert!(sum.is_finite() && (sum > 0.0) == light.guided().is_some());
     }
-    // A distribution of nothing is none.
-    assert!(Distribution1D::new([0.0; 3]).is_none());
 }
