@@ -37,8 +37,15 @@ pub struct Key {
 
 /// Every setting that can be varied, beside the parameters of the integrator.
 pub static KEYS: &[Key] = &[
-    Key::new("sampler", "point set", |s, v| Ok(s.settings.sampler = v.parse()?)),
-    Key::new("filter", "pixel filter", |s, v| Ok(s.settings.filter = v.parse()?)).changing(),
+    Key::new("sampler", "point set", |s, v| {
+        s.settings.sampler = v.parse()?;
+        Ok(())
+    }),
+    Key::new("filter", "pixel filter", |s, v| {
+        s.settings.filter = v.parse()?;
+        Ok(())
+    })
+    .changing(),
     Key::new("integrator", "what is estimated", set_integrator).changing(),
     Key::new("max-depth", "longest path in surfaces", |s, v| set_parameter(s, "max_depth", v)).changing(),
     Key::new("sky-sampling", "how the sky is sampled", set_sky_sampling),
