@@ -17,7 +17,7 @@ const LISTED: usize = 200;
 /// The page.
 ///
 /// # Errors
-/// [`Error::Internal`] where a picture or the page cannot be made, which is a fault of ours.
+/// [`crate::error::Error::Internal`] where a picture or the page cannot be made, which is a fault of ours.
 pub fn page(check: &Crosscheck, summary: &Summary, machine: &Machine, input: &str) -> Result<String> {
     let verdict = match summary.passed {
         true => Verdict::ok(summary.verdict.clone()),

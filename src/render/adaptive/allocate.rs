@@ -41,7 +41,7 @@ pub struct Need {
 /// What every tile needs. `floor`: see [`super::estimate::floor_of`].
 ///
 /// Variances are those of a single sample (error times samples), as tiles have had different numbers. What exceeds
-/// [`SURPRISE`] times the mean of the 3 x 3 tiles around is taken from its pixel and shared by these tiles: where rays
+/// `SURPRISE` times the mean of the 3 x 3 tiles around is taken from its pixel and shared by these tiles: where rays
 /// find a lamp by chance, which of the tiles has had that chance says nothing of which needs samples, and to go by it
 /// would leave those dark that have not (the bias of adaptive sampling, Kirk and Arvo 1991). When an eighth of the pixels
 /// has met it, it is no surprise any more.
