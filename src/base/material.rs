@@ -58,7 +58,7 @@ pub struct Scattering {
 }
 
 impl Scattering {
-    /// Evenly, as far as anybody knows.
+    /// Evenly.
     pub const EVEN: Scattering = Scattering { even: 1.0, facets: 0.0, alpha: 1.0 };
 }
 
@@ -97,9 +97,10 @@ pub trait Material: Send + Sync {
     /// decisions, not for radiometry.
     fn albedo(&self, m: &Prepared, wo: Vec3) -> Rgb;
 
-    /// What lights may know of it.
-    fn scattering(&self, _m: &Prepared) -> Scattering {
-        Scattering::EVEN
+    /// What lights may know of it. None where that is not known: lights take it for even, and light samples alone are
+    /// never trusted with it, as they might miss a narrow lobe.
+    fn scattering(&self, _m: &Prepared) -> Option<Scattering> {
+        None
     }
 
     /// Reflectance of the part that scatters evenly (Lambert), for closed forms; black where there is none.

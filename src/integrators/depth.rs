@@ -16,7 +16,7 @@ pub(super) struct Block<'a> {
     pub scene: &'a Scene,
     pub ids: &'a PathIds,
     pub depth: u32,
-    /// See [`PathTracer::mis`].
+    /// See [`super::path::PathTracer::mis`].
     pub mis: bool,
     /// Whether each light is sampled.
     pub each_light: bool,

@@ -7,6 +7,7 @@ use super::path::{PathScratch, PathTracer};
 use super::strategy::Strategy;
 use super::surface::Surface;
 use crate::base::light::{ChosenLight, GuidedLight, Lobes};
+use crate::base::material::Scattering;
 use crate::sampler::{Dim, Slot};
 
 /// A guided light and its index.
@@ -27,7 +28,8 @@ impl PathTracer {
         let strategy = if delta { Strategy::Bsdf } else { block.strategies.of(&s.v) };
         let (index, light) = guided;
         let ready = strategy != Strategy::Bsdf && {
-            let lobes = Lobes { wo: s.v.wo, scattering: s.material.scattering(&s.prepared) };
+            let scattering = s.material.scattering(&s.prepared).unwrap_or(Scattering::EVEN);
+            let lobes = Lobes { wo: s.v.wo, scattering };
             light.prepare(&s.receiver, &lobes, &mut paths.guide)
         };
         if !delta {

@@ -4,7 +4,7 @@
 //! render will use, in two independent halves; their spread is the variance that the render would have, stratification,
 //! visibility and all. Rays are counted, not timed, so that the choice is a function of scene and seed. A material's
 //! strategy is the one with the least variance times cost. Materials that few of the pixels show keep to what is good in
-//! most scenes: light samples alone where they scatter evenly, both otherwise.
+//! most scenes: light samples alone where they are known to scatter evenly, both otherwise.
 
 use super::path::PathTracer;
 use super::strategy::{Strategies, Strategy};
@@ -32,7 +32,7 @@ const SHARE: f64 = 0.03;
 const SCOUTS: usize = 8192;
 /// Seeds of pilots lie apart from those of renders.
 const SEED: u64 = 0x7069_6c6f_7400_0000;
-/// As [`crate::bench::error::measure::EPSILON`]: what a dark pixel counts for.
+/// Part of the squared mean that is added to a pixel's own, as in relMSE: what a dark pixel counts for.
 const EPSILON: f64 = 0.01;
 
 /// What is spent on a sample beside its rays, in rays of a shadow's cost.
@@ -48,10 +48,11 @@ const TAME: f32 = 16.0;
 
 /// What is tried for a material. Scattered rays alone miss what is small and bright. So do light samples on narrow lobes:
 /// within a coarse cell with a sun, the rest of the cell is hardly ever drawn, and a lobe may lie just there.
-fn candidates(scattering_is_even: bool, contrast: f32) -> &'static [Strategy] {
-    match (contrast <= TAME, scattering_is_even) {
-        (true, _) => &[Strategy::Both, Strategy::Light, Strategy::Bsdf],
+fn candidates(is_even: bool, contrast: f32) -> &'static [Strategy] {
+    match (contrast <= TAME, is_even) {
+        (true, true) => &[Strategy::Both, Strategy::Light, Strategy::Bsdf],
         (false, true) => &[Strategy::Both, Strategy::Light],
+        (true, false) => &[Strategy::Both, Strategy::Bsdf],
         (false, false) => &[Strategy::Both],
     }
 }
@@ -59,7 +60,8 @@ fn candidates(scattering_is_even: bool, contrast: f32) -> &'static [Strategy] {
 /// A kind of surface: those that share a material.
 struct Class<'a> {
     material: &'a Arc<dyn Material>,
-    scattering_is_even: bool,
+    /// Whether it was seen, and scattered evenly wherever that was.
+    is_even: bool,
     /// Where it was seen first by a camera ray.
     pixels: Vec<[u32; 2]>,
     strategy: Strategy,
@@ -75,17 +77,12 @@ struct Classes<'a> {
 impl<'a> Classes<'a> {
     fn new(scene: &'a Scene) -> Self {
         let mut all = Classes { list: Vec::new(), of: Vec::new() };
-        // A material that thousands of objects share is mostly that of the object before.
         let mut by_address = std::collections::HashMap::new();
         for object in &scene.objects {
             let slots = object.materials.iter().map(|material| {
                 *by_address.entry(Arc::as_ptr(material).cast::<()>()).or_insert_with(|| {
-                    let class = Class {
-                        material,
-                        scattering_is_even: true,
-                        pixels: Vec::new(),
-                        strategy: Strategy::Both,
-                    };
+                    let class =
+                        Class { material, is_even: false, pixels: Vec::new(), strategy: Strategy::Both };
                     all.list.push(class);
                     all.list.len() - 1
                 })
@@ -119,10 +116,10 @@ pub(super) fn choose(tracer: &PathTracer, scene: &Scene, plan: &PilotPlan) -> Op
     let most = (affordable / classes.list.len().max(1)).min(MOST);
     for class in classes.list.iter_mut().filter(|c| !c.material.is_delta() && !c.material.is_black()) {
         if class.pixels.len().min(most) < LEAST {
-            class.strategy = if class.scattering_is_even { Strategy::Light } else { Strategy::Both };
+            class.strategy = if class.is_even { Strategy::Light } else { Strategy::Both };
             continue;
         }
-        let candidates = candidates(class.scattering_is_even, contrast);
+        let candidates = candidates(class.is_even, contrast);
         if let [only] = candidates {
             class.strategy = *only;
             continue;
@@ -171,7 +168,9 @@ fn scout(scene: &Scene, plan: &PilotPlan, scouts: usize, classes: &mut Classes) 
         let mut prepared = Prepared::default();
         let class = classes.of_vertex(&v);
         class.material.prepare(&v, &mut prepared);
-        class.scattering_is_even &= class.material.scattering(&prepared).facets == 0.0;
+        let is_even = class.material.transmission().is_none()
+            && class.material.scattering(&prepared).is_some_and(|s| s.facets == 0.0);
+        class.is_even = is_even && (class.is_even || class.pixels.is_empty());
         class.pixels.push(*pixel);
     }
     pixels.len() as u64

@@ -1,6 +1,6 @@
 //! Lambert's surface, lit and seen from the same side, whichever it is.
 
-use crate::base::material::{BsdfEval, BsdfSample, Material, Prepared};
+use crate::base::material::{BsdfEval, BsdfSample, Material, Prepared, Scattering};
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::base::shape::Needs;
 use crate::base::vertex::Vertex;
@@ -72,6 +72,11 @@ impl Material for Diffuse {
         }
         // Directions in the surface itself scatter nothing.
         (wo.z * wi.z > 0.0).then(|| BsdfSample { wi, weight: *m.view::<Rgb>(), pdf, delta: false })
+    }
+
+    fn scattering(&self, m: &Prepared) -> Option<Scattering> {
+        let even = m.view::<Rgb>().luminance() * std::f32::consts::FRAC_1_PI;
+        Some(Scattering { even, ..Scattering::EVEN })
     }
 
     fn albedo(&self, m: &Prepared, _wo: Vec3) -> Rgb {

@@ -1,6 +1,6 @@
 //! A surface that glows, and may scatter as a diffuse one.
 
-use crate::base::material::{BsdfEval, BsdfSample, Emitter, Material, Prepared};
+use crate::base::material::{BsdfEval, BsdfSample, Emitter, Material, Prepared, Scattering};
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::base::shape::Needs;
 use crate::base::vertex::Vertex;
@@ -70,6 +70,10 @@ impl Material for Emissive {
 
     fn prepare(&self, vertex: &Vertex, out: &mut Prepared) {
         self.body.prepare(vertex, out);
+    }
+
+    fn scattering(&self, m: &Prepared) -> Option<Scattering> {
+        self.body.scattering(m)
     }
 
     fn eval(&self, m: &Prepared, wo: Vec3, wi: Vec3) -> BsdfEval {

@@ -249,15 +249,15 @@ impl<L: Lobe> Material for Glossy<L> {
         sum / (N * N) as f32
     }
 
-    fn scattering(&self, m: &Prepared) -> Scattering {
+    fn scattering(&self, m: &Prepared) -> Option<Scattering> {
         let m = m.view::<At>();
         // White on top is Fresnel's, which is little but at grazing.
         let white = if self.lobe.has_white() { 0.05 } else { 0.0 };
-        Scattering {
+        Some(Scattering {
             even: m.diffuse.luminance() * self.style.diffuse_scale,
             facets: m.specular.luminance() + white,
             alpha: self.lobe.alpha(),
-        }
+        })
     }
 
     fn diffuse(&self, m: &Prepared) -> Rgb {

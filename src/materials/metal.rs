@@ -225,11 +225,12 @@ impl Material for Metal {
         (e.pdf > 0.0).then(|| BsdfSample { wi, weight: e.f_cos / e.pdf, pdf: e.pdf, delta: false })
     }
 
-    fn scattering(&self, m: &Prepared) -> Scattering {
+    fn scattering(&self, m: &Prepared) -> Option<Scattering> {
         let at: &At = m.view();
         // Light that bounced between facets leaves almost evenly.
         let even = 0.1 * at.multiple.luminance() * std::f32::consts::FRAC_1_PI;
-        Scattering { even, facets: at.f0.luminance().max(0.05), alpha: (self.ggx.ax * self.ggx.ay).sqrt() }
+        let alpha = (self.ggx.ax * self.ggx.ay).sqrt();
+        Some(Scattering { even, facets: at.f0.luminance().max(0.05), alpha })
     }
 
     fn albedo(&self, m: &Prepared, wo: Vec3) -> Rgb {

@@ -130,3 +130,6 @@ fn fold(taps: &[f32], points: impl Iterator<Item = [Rgb; 2]>) -> [Rgb; 2] {
     }
     sums
 }
+
+#[cfg(test)]
+mod tests;

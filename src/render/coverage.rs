@@ -10,6 +10,7 @@ use crate::base::geometry::{Geometry, Group, Leaf};
 use crate::base::pixel_rect::PixelRect;
 use crate::base::shape::Shape;
 use crate::math::aabb::DAabb;
+use crate::memory;
 use crate::sampling::filter::PixelFilter;
 use crate::scene::Scene;
 use glam::{DAffine3, DVec3};
@@ -82,12 +83,18 @@ struct Marker<'a> {
 
 impl Coverage {
     /// Of the pixels `rect` of a scene's film; None where the camera does not project by lines through one point, where
-    /// every pixel is covered, or where so few samples of a pixel would be saved that rays are cheaper.
+    /// every pixel is covered, where so few samples of a pixel would be saved that rays are cheaper, or where memory is
+    /// short.
     pub fn of(scene: &Scene, rect: PixelRect, filter: PixelFilter, spp: u32) -> Option<Self> {
         let projection = scene.camera.projection()?;
         let primitives = scene.report.triangles + scene.report.procedurals;
         let samples = rect.area() as u64 * u64::from(spp);
         if primitives.saturating_mul(COSTS[0]) > samples.saturating_mul(COSTS[1]) {
+            return None;
+        }
+        // Boxes over runs of primitives, and a mark a pixel.
+        let runs = size_of::<DAabb>() as u64 * primitives.div_ceil(FAN as u64 - 1);
+        if !memory::fits(runs + rect.area() as u64) {
             return None;
         }
         let reach = f64::from(filter.radius()) + MARGIN;

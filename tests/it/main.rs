@@ -18,6 +18,7 @@ mod light;
 mod matches;
 mod open_house;
 mod pictures;
+mod product;
 mod reference;
 mod seeds;
 mod source;

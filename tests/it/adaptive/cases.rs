@@ -63,13 +63,14 @@ fn room() -> String {
 }
 
 /// A small lamp just above a floor, turned away from the camera: of all camera rays 1 in 10,000 scatters into it (the
-/// lamp's area is so much of what the camera sees of the floor). Without it, a quarter of the error is missing.
+/// lamp's area is so much of what the camera sees of the floor). A picture without its light has an error of 9.2 %. The
+/// first look is at 40,000 paths, of which 1 in 45 renders has none that found it.
 fn needle() -> String {
     head("[0, 1.5, 0]", "[0, 0, 0.001]", 60, "type = \"constant\"")
-        + "[materials.lamp]\ntype = \"emissive\"\nradiance = 1500\n"
+        + "[materials.lamp]\ntype = \"emissive\"\nradiance = 500\n"
         + &object(FLOOR, "clay")
         + &object(
-            "type = \"rectangle\", center = [0.1, 0.2, 0.2], edge_u = [0.0173, 0, 0], edge_v = [0, 0, 0.0173]",
+            "type = \"rectangle\", center = [0.1, 0.08, 0.2], edge_u = [0.0173, 0, 0], edge_v = [0, 0, 0.0173]",
             "lamp",
         )
 }
@@ -121,8 +122,8 @@ pub const CASES: [Case; 5] = [
         kind: "path",
         params: &[("max_depth", 2.0), ("light_sampling", 0.0)],
         reference_params: &[("max_depth", 2.0)],
-        target: 0.2,
-        side: 16,
+        target: 0.07,
+        side: 25,
         reference_spp: 1 << 14,
     },
     Case {
