@@ -57,6 +57,7 @@ fn settings(desc: &SceneDesc, wish: &Wish) -> Result<RenderSettings> {
         spp: wish.spp.or(given.spp).unwrap_or(usual.spp),
         seed: given.seed.unwrap_or(usual.seed),
         sampler: sampler.unwrap_or(usual.sampler),
+        moments: true,
         filter: filter.unwrap_or(usual.filter),
         threads: if wish.threads == 0 { usual.threads } else { wish.threads },
         ..usual

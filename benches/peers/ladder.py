@@ -22,8 +22,8 @@ from measure import EPSILON, Reference, write_record
 
 # Seeds of references lie apart from those of runs.
 REFERENCE_SEED = 500_000
-# Samples of one picture of a reference: few enough for a peer that keeps all of them in memory.
-MOST_AT_ONCE = 1024
+# Samples of all pixels of one picture of a reference: few enough for a peer that keeps them in memory.
+MOST_AT_ONCE = 1 << 24
 # Samples that tell whether a pixel is wholly covered.
 ALPHA_SPP = 256
 
@@ -86,9 +86,9 @@ def missing(name, install, error):
     sys.exit(f"cannot load {name}: {error}\ninstall it with: {install}")
 
 
-def half(peer, series, spp, seed):
+def half(peer, series, spp, seed, pixels):
     """Mean of independent pictures."""
-    pictures = -(-spp // MOST_AT_ONCE)
+    pictures = -(-spp * pixels // MOST_AT_ONCE)
     total = sum(peer.render(series, -(-spp // pictures), seed + i)[1].astype(np.float64) for i in range(pictures))
     return total / pictures
 
@@ -104,7 +104,7 @@ def reference(peer, scene, a):
         return Reference.load(path)
     series = peer.series()[0]
     spp = max(a.reference_spp // 2, 1)
-    halves = [half(peer, series, spp, REFERENCE_SEED + i * 10_000) for i in range(2)]
+    halves = [half(peer, series, spp, REFERENCE_SEED + i * 10_000, w * h) for i in range(2)]
     made = Reference.of_halves(*halves, peer.alpha(min(a.reference_spp, ALPHA_SPP)), a.reference_spp)
     os.makedirs(folder, exist_ok=True)
     made.save(path)

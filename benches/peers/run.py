@@ -1,15 +1,17 @@
 #!/usr/bin/env python3
-"""Everything: each peer's error against time on the scenes of scenes.py.
+"""Everything: error against time of skylit and its peers on the scenes of scenes.py, and the tables and plots of them.
 
-    python3 benches/peers/run.py DIR --json OUTDIR [--peers mitsuba,cycles,lux] [--scenes NAME,...] [options]
+    python3 benches/peers/run.py DIR --json OUTDIR [--peers skylit,mitsuba,cycles,lux] [--scenes NAME,...] [options]
 
-Each peer runs in a process of its own, one after the other, and writes OUTDIR/PEER.json; `skylit bench error SCENE ...
---with OUTDIR/PEER.json` draws them. Where one fails, the others go on. Other options (--spp, --replicates,
---reference-spp, --threads, --size) are handed on as they are. References are kept in DIR/references.
+Each renderer runs in a process of its own, one after the other, and writes OUTDIR/NAME.json; then all records that stand
+in OUTDIR are drawn as OUTDIR/all.html and all.txt, a plot of each scene as SCENE.svg. Where one fails, the others go on.
+Other options (--spp, --replicates, --reference-spp, --threads, --size) are handed on as they are. References are kept in
+DIR/references.
 
 Peers that need another Python than this one: --python cycles=PROGRAM, as often as needed.
 """
 import argparse
+import json
 import os
 import subprocess
 import sys
@@ -17,6 +19,7 @@ import sys
 HOME = os.path.dirname(os.path.abspath(__file__))
 # Names of records, with the words of their commands.
 PEERS = {
+    "skylit": [["skylit"]],
     "mitsuba": [["mitsuba-llvm", "peer_mitsuba.py"], ["mitsuba-scalar", "peer_mitsuba.py", "--variant", "scalar_rgb"]],
     "cycles": [["cycles", "peer_cycles.py"]],
     "lux": [["lux", "peer_lux.py"]],
@@ -29,12 +32,35 @@ def arguments():
     p.add_argument("--json", required=True, metavar="OUTDIR")
     p.add_argument("--peers", default=",".join(PEERS))
     p.add_argument("--scenes", help="default: all that are in DIR")
+    p.add_argument("--skylit", default="target/release/skylit", metavar="PROGRAM")
     p.add_argument("--python", action="append", default=[], metavar="PEER=PROGRAM")
     a, rest = p.parse_known_args()
     for name in a.peers.split(","):
         if name not in PEERS:
             p.error(f"unknown peer {name}; known: {', '.join(PEERS)}")
     return a, rest
+
+
+def all_scenes(folder):
+    return sorted(n[:-5] for n in os.listdir(folder) if n.endswith(".json"))
+
+
+def draw(a):
+    """Pages of all records that there are, skylit's first; a plot for each scene of that."""
+    path = lambda name: os.path.join(a.json, name)
+    kept = [path(f"{r}.json") for words in PEERS.values() for r, *_ in words if os.path.exists(path(f"{r}.json"))]
+    others = [w for record in kept[1:] for w in ("--with", record)]
+    with open(path("all.txt"), "w") as out:
+        subprocess.run([a.skylit, "bench", "error", kept[0], *others, "--html", path("all.html")], stdout=out)
+    with open(kept[0]) as f:
+        record = json.load(f)
+    for scene in record["scenes"]:
+        one = path(f".{scene['name']}.json")
+        with open(one, "w") as f:
+            json.dump({**record, "scenes": [scene]}, f)
+        svg = ["--svg", path(f"{scene['name']}.svg")]
+        subprocess.run([a.skylit, "bench", "error", one, *others, *svg], stdout=subprocess.DEVNULL)
+        os.remove(one)
 
 
 def main():
@@ -44,13 +70,19 @@ def main():
     names = a.scenes.split(",") if a.scenes else []
     failed = []
     for peer in a.peers.split(","):
-        for record, script, *more in PEERS[peer]:
-            python = pythons.get(peer, sys.executable)
+        for record, *script in PEERS[peer]:
             out = ["--json", os.path.join(a.json, f"{record}.json")]
-            words = [python, os.path.join(HOME, script), a.dir, *names, *out, *more, *rest]
+            if peer == "skylit":
+                files = [os.path.join(a.dir, f"{name}.toml") for name in names or all_scenes(a.dir)]
+                kept = ["--references", os.path.join(a.dir, "references")]
+                words = [a.skylit, "bench", "error", *files, *kept, *out, *rest]
+            else:
+                python = pythons.get(peer, sys.executable)
+                words = [python, os.path.join(HOME, script[0]), a.dir, *names, *out, *script[1:], *rest]
             print(f"{record}:", file=sys.stderr)
-            if subprocess.run(words).returncode != 0:
+            if subprocess.run(words, stdout=subprocess.DEVNULL).returncode != 0:
                 failed.append(record)
+    draw(a)
     if failed:
         sys.exit(f"failed: {', '.join(failed)}")
 

@@ -140,6 +140,11 @@ pub trait Light: Send + Sync {
         sample.li.unwrap_or_else(|| self.le(&PathEnd { wi: sample.wi, vertex: None }))
     }
 
+    /// How it is sampled, for people, such as "by a table"; empty where there is nothing to tell.
+    fn describe(&self) -> String {
+        String::new()
+    }
+
     /// Whether it shines from one point or direction alone, which no path meets by chance; its samples are all the same.
     fn is_delta(&self) -> bool {
         false

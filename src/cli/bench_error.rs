@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 pub struct ErrorArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Further scenes, measured alike
+    /// Further scenes, measured alike. A single record of --json (or a peer's) instead of scenes is shown again
     #[arg(value_name = "SCENE")]
     more: Vec<PathBuf>,
     /// Render with each of these values of a setting: a flag of `skylit render` such as sampler, sky-sampling, backend or
@@ -105,25 +105,40 @@ impl ErrorArgs {
             return Err(Error::Usage("--spp takes rising numbers, such as 4,16,64".into()));
         }
         let peers = self.with.iter().map(|p| Record::load(p)).collect::<Result<Vec<_>>>()?;
+        let set = PixelSet::from(o.pixels);
+        if self.scene.input.extension().is_some_and(|e| e == "json") {
+            let record = self.kept_record()?;
+            let all: Vec<&Record> = std::iter::once(&record).chain(&peers).collect();
+            interrupt::hold_off(|| self.write(&all, &[]))?;
+            return print(present::text(&all, set).as_bytes());
+        }
         let inputs = std::iter::once(&self.scene.input).chain(&self.more);
         let plans = inputs.map(|input| self.plan(input, setting)).collect::<Result<Vec<_>>>()?;
         let bar = BenchBar::new(setting);
         let measured: Result<Vec<Measured>> = plans.iter().map(|plan| measure(plan, &bar)).collect();
         bar.finish();
         let measured = measured?;
-        let machine = Machine::here();
         let record = Record {
             format: FORMAT.into(),
             program: program(),
             command: std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect(),
-            machine: serde_json::to_value(&machine)
+            machine: serde_json::to_value(Machine::here())
                 .map_err(|e| Error::Internal(format!("cannot write the machine's facts: {e}")))?,
             scenes: measured.iter().map(|m| m.record.clone()).collect(),
         };
         let all: Vec<&Record> = std::iter::once(&record).chain(&peers).collect();
-        let set = PixelSet::from(o.pixels);
-        interrupt::hold_off(|| self.write(&all, &measured, &machine))?;
+        interrupt::hold_off(|| self.write(&all, &measured))?;
         print(present::text(&all, set).as_bytes())
+    }
+
+    /// The record that stands in place of scenes.
+    fn kept_record(&self) -> Result<Record> {
+        if !self.more.is_empty() || !self.sweeps.is_empty() {
+            let message =
+                "a record is shown as it is: it takes no further scenes and no -L (--with adds records)";
+            return Err(Error::Usage(message.into()));
+        }
+        Record::load(&self.scene.input)
     }
 
     fn plan(&self, input: &Path, setting: &Setting) -> Result<Plan> {
@@ -179,7 +194,7 @@ impl ErrorArgs {
         Some(Kept { path: folder.join(format!("{name}-{short:08x}.exr")), key })
     }
 
-    fn write(&self, records: &[&Record], measured: &[Measured], machine: &Machine) -> Result<()> {
+    fn write(&self, records: &[&Record], measured: &[Measured]) -> Result<()> {
         let (o, set) = (&self.output, PixelSet::from(self.output.pixels));
         if let Some(path) = &o.json {
             write_file(path, records[0].to_json()?.as_bytes())?;
@@ -191,7 +206,11 @@ impl ErrorArgs {
             write_file(path, scene.plot(set).to_svg()?.as_bytes())?;
         }
         if let Some(path) = &o.html {
-            let report = Report::new("Error against time").machine(machine);
+            let mut report = Report::new("Error against time");
+            // What a record was measured on is not known in this form.
+            if !measured.is_empty() {
+                report = report.machine(&Machine::here());
+            }
             let page = present::page(records, set, shown(measured)?, report);
             write_file(path, page.to_html()?.as_bytes())?;
         }

@@ -9,7 +9,9 @@ use crate::error::{Error, Result};
 use crate::image::write::{check_file, write_file};
 use crate::math::aabb::DAabb;
 use crate::memory::in_words;
+use crate::render::coverage::Coverage;
 use crate::render::film::BYTES_PER_PIXEL;
+use crate::render::settings::RenderSettings;
 use crate::scene::build::{BuildOptions, build};
 use crate::scene::desc::{Content, SceneDesc};
 use crate::scene::{Scene, features::Features};
@@ -84,6 +86,10 @@ struct Info {
     emitting_shapes: usize,
     objects: Vec<String>,
     needs: Vec<&'static str>,
+    /// How lights at infinity are found.
+    sky_sampling: Vec<String>,
+    /// What a render will leave out.
+    skips: Vec<String>,
     memory: Cost,
 }
 
@@ -138,6 +144,8 @@ impl Info {
             emitting_shapes: 0,
             objects: Vec::new(),
             needs: Vec::new(),
+            sky_sampling: Vec::new(),
+            skips: Vec::new(),
             memory: Cost { geometry: 0, kernel_estimate: 0, film_estimate: 0 },
         }
     }
@@ -154,6 +162,9 @@ impl Info {
         self.emitting_shapes = scene.lights.by_path.len();
         self.objects = scene.objects.iter().map(|o| o.name.clone()).collect();
         self.needs = needs(&scene.features);
+        self.skips = skips(scene, self.spp);
+        let told = scene.lights.at_infinity.iter().map(|&l| scene.lights.list[l as usize].describe());
+        self.sky_sampling = told.filter(|s| !s.is_empty()).collect();
         let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
         self.memory = Cost {
             geometry: report.geometry_bytes,
@@ -170,6 +181,28 @@ fn needs(features: &Features) -> Vec<&'static str> {
         (features.material_slots, "materials by face"),
     ];
     all.iter().filter(|n| n.0).map(|n| n.1).collect()
+}
+
+/// What is left out of this scene's renders with the usual settings; `spp` is what its file says.
+fn skips(scene: &Scene, spp: Option<u32>) -> Vec<String> {
+    let size = [scene.film.width, scene.film.height];
+    let usual = RenderSettings::new(size);
+    let coverage = Coverage::of(scene, usual.crop, usual.filter, spp.unwrap_or(usual.spp));
+    let free = coverage.map_or(0.0, |c| c.free() as f64 / usual.crop.area() as f64);
+    let (f, lights) = (&scene.features, &scene.lights);
+    let mut out = Vec::new();
+    if free > 0.0 {
+        out.push(format!("samples of {:.1} % of the pixels, which no geometry projects into", 100.0 * free));
+    }
+    let all = [
+        (!f.emitting_surfaces, "the surfaces that last rays meet, as none shines"),
+        (lights.list.is_empty(), "shadow rays, as there is no light"),
+        (!f.many_lights && !lights.list.is_empty(), "the choice of a light"),
+        (!f.needs.uv, "texture coordinates and textures"),
+        (!f.needs.tangents, "tangents"),
+    ];
+    out.extend(all.iter().filter(|n| n.0).map(|n| n.1.to_owned()));
+    out
 }
 
 /// Every mesh of the scene, each once.
@@ -224,6 +257,7 @@ impl fmt::Display for Info {
         line(f, "picture", &format!("{} x {}{spp}, {integrator}", self.size[0], self.size[1]))?;
         line(f, "camera", &or_default(&self.camera, "frames the bounds"))?;
         line(f, "sky", &or_default(&self.sky, "none"))?;
+        self.sky_sampling.iter().try_for_each(|s| line(f, "", s))?;
         for mesh in &self.meshes {
             line(f, "mesh", &mesh.to_string())?;
         }
@@ -249,6 +283,7 @@ impl fmt::Display for Info {
         if !self.needs.is_empty() {
             line(f, "needs", &self.needs.join(", "))?;
         }
+        self.skips.iter().try_for_each(|s| line(f, "skips", s))?;
         let m = &self.memory;
         let [geometry, kernel, film] = [m.geometry, m.kernel_estimate, m.film_estimate].map(in_words);
         line(f, "memory", &format!("geometry {geometry}, kernel about {kernel}, film about {film}"))

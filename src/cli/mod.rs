@@ -6,6 +6,7 @@ mod bench_error;
 mod check;
 mod convert;
 mod crosscheck;
+mod denoise;
 mod info;
 mod interrupt;
 mod list;

@@ -1,6 +1,7 @@
 //! Flags that say what is written, and the writing.
 
 use super::args::{TransferArg, number_in};
+use super::denoise::{self, DenoiseReport};
 use crate::color::Transfer;
 use crate::error::Result;
 use crate::image::picture::SampleKind;
@@ -23,6 +24,10 @@ pub struct OutputArgs {
     /// Further layers, for EXR (see `skylit list aov`)
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     aov: Vec<String>,
+    /// Add the picture without its noise as layer `denoised`, and show that one in PNG and JPEG: fitted to albedo, normal
+    /// and depth around, so smooth and near the truth, but not unbiased
+    #[arg(long)]
+    denoise: bool,
     /// Stops of exposure, for PNG and JPEG [default: 0]
     #[arg(long, value_name = "EV", allow_hyphen_values = true, value_parser = |s: &str| number_in(s, -64.0..=64.0))]
     exposure: Option<f64>,
@@ -41,7 +46,13 @@ pub struct OutputArgs {
 pub struct OutputPlan {
     /// Layers read from first surfaces.
     pub aovs: Vec<&'static AovRow>,
+    /// Those that are written.
+    written: Vec<&'static AovRow>,
     film_layers: Vec<&'static FilmLayer>,
+    /// Whether a layer without noise is made.
+    pub denoises: bool,
+    /// Whether the picture must know its own error.
+    pub moments: bool,
     look: Look,
 }
 
@@ -49,33 +60,55 @@ impl OutputArgs {
     /// Errors for unknown names, and where a picture could not be written.
     pub fn check(&self) -> Result<OutputPlan> {
         let names: Vec<&str> = self.aov.iter().map(String::as_str).collect();
-        let aovs = aov::find(&names)?;
+        let written = aov::find(&names)?;
+        let mut aovs = written.clone();
+        if self.denoise {
+            let more = aov::find(&denoise::FEATURES)?;
+            aovs.extend(more.into_iter().filter(|row| !written.iter().any(|w| w.name == row.name)));
+        }
         let tonemap: Option<ToneMap> = self.tonemap.as_deref().map(str::parse).transpose()?;
         self.outputs.iter().try_for_each(|path| check_writable(path))?;
         let exposure = self.exposure.unwrap_or(0.0) as f32;
-        let film_layers = film_layers::REGISTRY.iter().filter(|f| names.contains(&f.name)).collect();
+        let film_layers: Vec<_> = film_layers::REGISTRY.iter().filter(|f| names.contains(&f.name)).collect();
         Ok(OutputPlan {
+            denoises: self.denoise,
+            moments: self.denoise || film_layers.iter().any(|f| f.needs_moments),
             aovs,
+            written,
             film_layers,
             look: Look { exposure, tonemap: tonemap.unwrap_or_default(), ..Look::default() },
         })
     }
 
-    /// Writes every output, each whole or not at all.
-    pub fn write(&self, plan: &OutputPlan, rendered: &Rendered, info: &PictureInfo) -> Result<()> {
+    /// Writes every output, each whole or not at all; tells what was done to the noise.
+    pub fn write(
+        &self,
+        plan: &OutputPlan,
+        rendered: &Rendered,
+        info: &PictureInfo,
+    ) -> Result<Option<DenoiseReport>> {
         let mut picture =
             rendered.film.picture(if self.full_float { SampleKind::Float } else { SampleKind::Half });
         rendered.layers.push_planes(&mut picture);
         plan.film_layers.iter().for_each(|layer| (layer.push)(&rendered.film, &mut picture));
         picture.metadata = info.metadata.clone();
+        let report = match self.denoise {
+            true => Some(denoise::add_layer(&rendered.film, &mut picture)?),
+            false => None,
+        };
+        denoise::drop_unwanted(&mut picture, &plan.written);
+        let shown = self.denoise.then(|| denoise::shown(&picture));
         let transfer = self.transfer.map_or(info.transfer, |TransferArg(t)| t);
         let look = Look { transfer, ..plan.look };
         let options = WriteOptions { look, alpha: info.background == Background::Transparent };
         self.outputs.iter().try_for_each(|path| {
-            write_picture(path, &picture, &options)?;
+            let has_layers = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
+            let picture = shown.as_ref().filter(|_| !has_layers).unwrap_or(&picture);
+            write_picture(path, picture, &options)?;
             log::info!("wrote {}", path.display());
             Ok(())
-        })
+        })?;
+        Ok(report)
     }
 }
 

@@ -59,7 +59,7 @@ struct SamplingArgs {
     /// Longest path in surfaces, the camera's first hit counted
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     max_depth: Option<u32>,
-    /// Point set [default: owen-sobol]
+    /// Point set [default: zsobol; with --time or a target the same as owen-sobol]
     #[arg(long, value_name = "NAME")]
     sampler: Option<String>,
     /// Pixel filter [default: blackman-harris]
@@ -125,6 +125,10 @@ pub fn run(args: &RenderArgs, setting: &Setting) -> Result<()> {
     let plan = args.check()?;
     let desc = args.scene.load()?;
     let settings = args.sampling.settings(&desc, &plan, setting.threads)?;
+    if plan.output.denoises && settings.spp < 2 {
+        let message = "--denoise holds two halves of the samples against each other: give at least --spp 2";
+        return Err(Error::Usage(message.into()));
+    }
     let s = &args.sampling;
     let integrator = choose_integrator(&desc, s.integrator.as_deref(), s.max_depth)?;
     let renderer = Renderer { integrator, settings };
@@ -146,8 +150,8 @@ pub fn run(args: &RenderArgs, setting: &Setting) -> Result<()> {
     let info = PictureInfo { background: scene.background, transfer, metadata: record.metadata() };
     interrupt::hold_off(|| {
         let saving = Instant::now();
-        args.output.write(&plan.output, &rendered, &info)?;
-        record.tell(load, saving.elapsed(), start.elapsed());
+        let denoised = args.output.write(&plan.output, &rendered, &info)?;
+        record.tell(denoised, load, saving.elapsed(), start.elapsed());
         match &args.stats {
             Some(path) => write_file(path, record.to_json()?.as_bytes()),
             None => Ok(()),
@@ -216,6 +220,7 @@ impl SamplingArgs {
             filter: plan.filter.unwrap_or(usual.filter),
             skip_background: self.sky_pixels != Some(SkyPixels::Sample),
             threads,
+            moments: plan.output.moments,
             aovs: plan.output.aovs.clone(),
             ..usual
         })

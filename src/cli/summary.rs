@@ -1,10 +1,12 @@
 //! What a render took: for people on stderr, and as JSON.
 
+use super::denoise::DenoiseReport;
 use super::rounds::Rounds;
 use crate::error::{Error, Result};
+use crate::integrators::{Avoided, RayCounts};
 use crate::memory::{self, in_words};
-use crate::render::Rendered;
 use crate::render::settings::RenderSettings;
+use crate::render::{RenderStats, Rendered};
 use crate::scene::{BuildReport, Scene};
 use serde::Serialize;
 use std::fmt;
@@ -76,6 +78,30 @@ struct Memory {
 struct Skipped {
     pixels: u64,
     samples: u64,
+    surface_points: u64,
+    /// By cause.
+    rays: Avoided,
+    /// Part of all rays that were not traced whose cause is known: of a camera ray a sample, and of a shadow ray and a
+    /// scattered ray a surface point.
+    explained: Option<f64>,
+}
+
+impl Skipped {
+    fn of(stats: &RenderStats) -> Self {
+        let a = stats.avoided;
+        let traced = |kind: fn(&RayCounts) -> u64| kind(&stats.rays) - kind(&stats.pilot);
+        // The last rays of paths that only ask whether they escape count as shadow rays.
+        let from_surfaces = traced(|r| r.scattered + r.shadow);
+        let avoided = (stats.samples - traced(|r| r.camera)) + (2 * a.points).saturating_sub(from_surfaces);
+        let known = stats.spared + a.rays();
+        Skipped {
+            pixels: stats.free_pixels,
+            samples: stats.spared,
+            surface_points: a.points,
+            rays: a,
+            explained: (avoided > 0 && a.points > 0).then(|| known as f64 / avoided as f64),
+        }
+    }
 }
 
 /// A sample that was not finite, to be traced again.
@@ -111,6 +137,7 @@ pub struct Record {
     rays: Rays,
     /// What the integrator decided beforehand.
     decided: String,
+    denoised: Option<DenoiseReport>,
     memory: Memory,
     dropped_samples: u64,
     first_dropped: Vec<Dropped>,
@@ -141,7 +168,7 @@ impl Record {
                 ..Seconds::default()
             },
             samples: stats.samples,
-            skipped: Skipped { pixels: stats.free_pixels, samples: stats.spared },
+            skipped: Skipped::of(stats),
             msamples_per_second: per_second(stats.samples),
             rounds: Rounds::new(rendered, settings),
             rays: Rays {
@@ -152,6 +179,7 @@ impl Record {
                 mrays_per_second: per_second(rays.total()),
             },
             decided: stats.decided.clone(),
+            denoised: None,
             memory: Memory {
                 geometry: scene.report.geometry_bytes,
                 kernel: scene.kernel.memory(),
@@ -167,7 +195,8 @@ impl Record {
     }
 
     /// Stages before and after the render.
-    pub fn tell(&mut self, load: Duration, save: Duration, total: Duration) {
+    pub fn tell(&mut self, denoised: Option<DenoiseReport>, load: Duration, save: Duration, total: Duration) {
+        self.denoised = denoised;
         self.seconds.load = load.as_secs_f64();
         self.seconds.save = save.as_secs_f64();
         self.seconds.total = total.as_secs_f64();
@@ -274,8 +303,31 @@ impl fmt::Display for Record {
                 plural(self.skipped.pixels, "pixel")
             )?;
         }
+        let a = &self.skipped.rays;
+        let causes = [
+            (a.dark_samples, "to light that brings nothing"),
+            (a.scattered_alone, "to light that scattered rays find"),
+            (a.lit_alone, "to light that was sampled"),
+            (a.absorbed, "where nothing is scattered"),
+            (a.roulette, "by roulette"),
+        ];
+        let causes: Vec<String> =
+            causes.iter().filter(|c| c.0 > 0).map(|(n, why)| format!("{} {why}", count(*n))).collect();
+        if !causes.is_empty() {
+            writeln!(f, "skipped {}: {}", plural(a.rays(), "ray"), causes.join(", "))?;
+        }
         if !self.decided.is_empty() {
             writeln!(f, "chosen  {}", self.decided)?;
+        }
+        if let Some(d) = &self.denoised {
+            writeln!(
+                f,
+                "denoise mean luminance x {:.5}; estimated relative RMSE {:.2} % to {:.2} %, {} kept",
+                d.mean_ratio,
+                100.0 * d.error_before,
+                100.0 * d.error_after,
+                plural(d.outliers as u64, "outlier")
+            )?;
         }
         let m = &self.memory;
         write!(f, "memory  geometry {}, kernel {}", in_words(m.geometry), in_words(m.kernel))?;

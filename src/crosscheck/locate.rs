@@ -4,7 +4,7 @@
 use crate::base::intersectable::QueryKind;
 use crate::base::pixel_rect::PixelRect;
 use crate::render::block::replicate_indices;
-use crate::render::film::REPLICATES;
+use crate::render::settings::RenderSettings;
 use crate::sampler::{SHADOW_KEY, ray_key};
 use serde::Serialize;
 use std::collections::HashMap;
@@ -50,7 +50,11 @@ const MAX_DEPTH: u32 = 256;
 
 /// The sources of rays of one tile by their keys, for those of `wanted` that are found. Keys have 32 bits: of a tile's
 /// hundred thousand, two are alike with a chance of 1e-5 for each ray asked; then the first counts.
-pub fn sources(rect: PixelRect, spp: u32, wanted: &[(u32, QueryKind)]) -> HashMap<(u32, QueryKind), Source> {
+pub fn sources(
+    rect: PixelRect,
+    settings: &RenderSettings,
+    wanted: &[(u32, QueryKind)],
+) -> HashMap<(u32, QueryKind), Source> {
     let mut left: HashMap<u32, Vec<QueryKind>> = HashMap::new();
     for (key, query) in wanted {
         let queries = left.entry(*key).or_default();
@@ -59,17 +63,18 @@ pub fn sources(rect: PixelRect, spp: u32, wanted: &[(u32, QueryKind)]) -> HashMa
         }
     }
     let mut found = HashMap::new();
+    let replicates = settings.replicates();
     for depth in 1..=MAX_DEPTH {
         if left.is_empty() {
             break;
         }
         for [x, y] in rect.pixels().map(|(x, y)| [x, y]) {
-            for r in 0..REPLICATES as u32 {
-                for index in replicate_indices(&(0..spp), r) {
+            for r in 0..replicates {
+                for index in replicate_indices(&(0..settings.spp), r, replicates) {
                     let key = ray_key(ray_key(x, y, r), index, depth);
                     for key in [key, key ^ SHADOW_KEY] {
                         let Some(queries) = left.remove(&key) else { continue };
-                        let sample = index * REPLICATES as u32 + r;
+                        let sample = index * replicates + r;
                         for query in queries {
                             let kind = kind_of(query, depth);
                             found.insert((key, query), Source { pixel: [x, y], sample, depth, kind });
@@ -108,7 +113,8 @@ mod tests {
             (shadow, QueryKind::Any),
             (foreign, QueryKind::Any),
         ];
-        let found = sources(rect, 8, &wanted);
+        let settings = RenderSettings { spp: 8, moments: true, ..RenderSettings::new([64, 64]) };
+        let found = sources(rect, &settings, &wanted);
         let at = |key, query| found.get(&(key, query)).copied();
         let source = |pixel, sample, depth, kind| Some(Source { pixel, sample, depth, kind });
         assert_eq!(at(camera, QueryKind::Closest), source([40, 20], 7, 1, RayKind::Camera));

@@ -227,7 +227,7 @@ impl Check<'_> {
         self.scene.kernel.take_failure()?;
         let seen = self.comparing.take_seen();
         let wanted: Vec<_> = seen.cases.iter().map(|c| (c.ray.key, c.query)).collect();
-        let sources = sources(rect, settings.spp, &wanted);
+        let sources = sources(rect, settings, &wanted);
         let mut out = TileResult {
             tally: Tally { lost: seen.lost, ..Tally::new(self.plan.contenders.len()) },
             rays: seen.rays,

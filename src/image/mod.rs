@@ -1,6 +1,7 @@
 //! L4: pictures in and out.
 
 mod deflate;
+pub mod denoise;
 mod exr_read;
 mod exr_write;
 mod hdr;

@@ -32,12 +32,19 @@ impl PathTracer {
             let lobes = Lobes { wo: s.v.wo, scattering };
             light.prepare(&s.receiver, &lobes, &mut paths.guide)
         };
+        let before = work.shadow.len();
         if !delta {
             let how = How { guided, ready, alone: strategy == Strategy::Light };
             block.ask_guided(s, &how, work, paths);
         }
+        match work.shadow.len() == before {
+            true if strategy == Strategy::Bsdf => work.avoided.scattered_alone += 1,
+            true => work.avoided.dark_samples += 1,
+            false => {}
+        }
         // Light samples have counted all that scattered rays would find, and there is nothing else to be found.
         if strategy == Strategy::Light && block.guided_alone {
+            work.avoided.lit_alone += 1;
             return;
         }
         let pmf = block.guided_pmf(index, s);

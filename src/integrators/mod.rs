@@ -3,6 +3,7 @@
 
 pub mod ambient_occlusion;
 pub mod analytic;
+mod avoided;
 mod depth;
 pub mod direct;
 mod escapes;
@@ -15,6 +16,8 @@ mod points;
 pub mod strategy;
 mod surface;
 pub mod whitted;
+
+pub use avoided::Avoided;
 
 use crate::base::hit::HitBatch;
 use crate::base::pixel_rect::PixelRect;
@@ -170,6 +173,8 @@ pub struct Workspace {
     pub indices: Vec<u32>,
     /// Rays traced so far.
     pub counts: RayCounts,
+    /// Rays that were not needed.
+    pub avoided: Avoided,
     /// State of the path integrators.
     pub paths: path::PathScratch,
 }

@@ -222,9 +222,10 @@ fn trace(
 ) -> (Vec<[Rgb; 2]>, RayCounts) {
     let mut batch = CameraBatch { spread: scene.camera.pixel_spread(), ..CameraBatch::default() };
     let (mut x, mut y) = (Vec::new(), Vec::new());
+    let points = plan.kind.points(plan.seed ^ SEED, None);
     for &[px, py] in pixels {
         for half in 0..2 {
-            let sampler = plan.kind.pixel(plan.seed ^ SEED, px, py, half);
+            let sampler = points.pixel(px, py, half);
             let key = ray_key(px, py, half);
             batch.ids.extend(PathId { sampler, index: 0, key }, SAMPLES as usize);
             x.resize(x.len() + SAMPLES as usize, px as f32 + 0.5);

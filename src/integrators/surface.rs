@@ -69,7 +69,12 @@ impl PathTracer {
         work: &mut Workspace,
         paths: &mut PathScratch,
     ) {
+        let all = surfaces.len();
         surfaces.retain(|s| !s.material.is_black());
+        let black = (all - surfaces.len()) as u64;
+        work.avoided.points += all as u64;
+        work.avoided.dark_samples += black;
+        work.avoided.absorbed += black;
         for s in surfaces.iter_mut() {
             s.material.prepare(&s.v, &mut s.prepared);
         }
@@ -79,6 +84,7 @@ impl PathTracer {
             }
             return;
         }
+        let before = work.shadow.len();
         if self.light_sampling && block.each_light {
             for s in surfaces.iter().filter(|s| !s.material.is_delta()) {
                 block.ask_each(s, work, paths);
@@ -93,6 +99,13 @@ impl PathTracer {
                 }
             }
         }
+        let asked = match self.light_sampling {
+            true => surfaces.iter().filter(|s| !s.material.is_delta()).count(),
+            false => 0,
+        };
+        work.avoided.scattered_alone += (surfaces.len() - asked) as u64;
+        // Of several lights each may have had a ray.
+        work.avoided.dark_samples += (asked as u64).saturating_sub((work.shadow.len() - before) as u64);
         for s in surfaces.iter() {
             self.extend(block, s, work, paths, |_, _| 0.0);
         }
@@ -116,10 +129,14 @@ impl PathTracer {
         } else {
             [0.0; 2]
         };
-        let Some(b) = s.material.sample(&s.prepared, s.wo, bsdf, lobe[0]) else { return };
+        let Some(b) = s.material.sample(&s.prepared, s.wo, bsdf, lobe[0]) else {
+            work.avoided.absorbed += 1;
+            return;
+        };
         let wi = s.v.frame.to_world(b.wi);
         let mut beta = s.state.beta * b.weight;
         if beta.is_black() || !s.v.is_consistent(wi) {
+            work.avoided.absorbed += 1;
             return;
         }
         let eta2 = s.state.eta2 * s.transmission.map_or(1.0, |t| t.eta2(s.wo, b.wi));
@@ -128,6 +145,7 @@ impl PathTracer {
             // glass it gains again on leaving. Never certain, so that no path of a white scene lives for ever.
             let q = (beta * eta2).max_component().min(0.95);
             if lobe[1] >= q {
+                work.avoided.roulette += 1;
                 return;
             }
             beta = beta / q;

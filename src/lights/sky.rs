@@ -19,7 +19,7 @@ use crate::sampling::warp;
 use glam::{Vec2, Vec3};
 pub use options::{SkyOptions, SkySampling};
 use placed::{PlacedDisc, Turn};
-use plan::Plan;
+use plan::{Level, Plan};
 use product::{Choice, ProductTable};
 use std::cell::RefCell;
 use std::f64::consts::PI;
@@ -75,17 +75,23 @@ impl SkyLight {
             shares.map(|(d, &share)| PlacedDisc::new(d, turn, intensity, share)).collect()
         };
         let is_plain = sky.constant().is_some() && sky.discs().is_empty();
-        if sampling == SkySampling::Product && !is_plain {
+        let plan_of = |levels: &[Level]| match sky.constant() {
+            Some(radiance) => plan_constant(&*sky, levels, f64::from(radiance.luminance()), sampling),
+            None => plan::plan(&*sky, levels, sampling),
+        };
+        // Of a constant sky without discs nothing need be known, unless a table is asked for.
+        let levels = if is_plain && sampling != SkySampling::Table { Vec::new() } else { Level::all(&*sky) };
+        let plan = match sampling {
+            SkySampling::Product if !is_plain => None,
+            _ => Some(plan_of(&levels)),
+        };
+        let Some(plan) = plan else {
             let discs = place(&vec![0.0; sky.discs().len()]);
-            let table = ProductTable::new(&*sky, &discs, turn, intensity);
+            let table = ProductTable::new(&*sky, &levels, &discs, turn, intensity);
             let map_total = table.as_ref().map_or(0.0, ProductTable::map_flux);
             let total = (map_total + disc_total) * f64::from(intensity);
             let map = table.map_or(MapSampler::None, MapSampler::Product);
             return Ok(SkyLight { sky, intensity, turn, discs, map, map_share: 0.0, total });
-        }
-        let plan = match sky.constant() {
-            Some(radiance) => plan_constant(&*sky, f64::from(radiance.luminance()), sampling),
-            None => plan::plan(&*sky, sampling),
         };
         let discs = place(&plan.disc_shares);
         let map = match (plan.table, sampling) {
@@ -106,19 +112,6 @@ impl SkyLight {
             MapSampler::None | MapSampler::Cosine => 0,
         };
         self.sky.memory() + table
-    }
-
-    /// For people: how the map is sampled.
-    pub fn describe(&self) -> String {
-        let map = match &self.map {
-            MapSampler::None => "by BSDF sampling alone".to_owned(),
-            MapSampler::Cosine => "by the cosine".to_owned(),
-            MapSampler::Table { grid, .. } => {
-                format!("by a table of {} x {} x {} cells", grid.count, grid.width, grid.height)
-            }
-            MapSampler::Product(table) => table.describe(),
-        };
-        format!("map {map}, {} discs", self.discs.len())
     }
 
     #[inline(always)]
@@ -233,7 +226,7 @@ fn cell_density(sky: &dyn Skybox, grid: &ChartGrid, c: ChartPoint, pmf: f64) -> 
 }
 
 /// A constant map needs no table to know what is left of it.
-fn plan_constant(sky: &dyn Skybox, luminance: f64, sampling: SkySampling) -> Plan {
+fn plan_constant(sky: &dyn Skybox, levels: &[Level], luminance: f64, sampling: SkySampling) -> Plan {
     let none = Plan {
         table: None,
         map_share: 0.0,
@@ -243,11 +236,23 @@ fn plan_constant(sky: &dyn Skybox, luminance: f64, sampling: SkySampling) -> Pla
     match sampling {
         SkySampling::Product | SkySampling::Compensated if sky.discs().is_empty() => none,
         SkySampling::Cosine if sky.discs().is_empty() => Plan { map_share: 1.0, ..none },
-        _ => plan::plan(sky, sampling),
+        _ => plan::plan(sky, levels, sampling),
     }
 }
 
 impl Light for SkyLight {
+    fn describe(&self) -> String {
+        let map = match &self.map {
+            MapSampler::None => "by BSDF sampling alone".to_owned(),
+            MapSampler::Cosine => "by the cosine".to_owned(),
+            MapSampler::Table { grid, .. } => {
+                format!("by a table of {} x {} x {} cells", grid.count, grid.width, grid.height)
+            }
+            MapSampler::Product(table) => table.describe(),
+        };
+        format!("map {map}, {} discs", self.discs.len())
+    }
+
     #[inline]
     fn sample_li(&self, at: &Receiver, u: [f32; 2]) -> Option<LightSample> {
         if let MapSampler::Product(_) = &self.map {

@@ -1,9 +1,11 @@
 //! Pixels that see nothing but what is behind everything: their filter's integral of it, instead of samples.
 //!
 //! The sky is looked up on a grid of 4 x 4 points a pixel, which neighbours share, and the filter laid over it one axis
-//! after the other: up to 144 points count for a pixel, of which it pays for 16 to 23. Half of the points, like the black
-//! fields of a chessboard, make an estimate by themselves and the other half another. Where the two differ by too much
-//! (the rim of a sun, stars, texels as large as pixels that differ wildly) the pixel is sampled as others are.
+//! after the other: up to 144 points count for a pixel, of which it pays for 16 to 23. Half of the points make an estimate
+//! by themselves and the other half another, in three ways: by rows, by columns and by fields, of which those at the ends
+//! of every four are one half and those between the other, so that a mere slope divides evenly. Where halves differ by too
+//! much (the rim of a sun, stars, texels as large as pixels that differ wildly) the pixel is sampled as others are. One way
+//! is not enough: halves agree by chance, too.
 
 use crate::base::camera::FilmSamples;
 use crate::base::pixel_rect::PixelRect;
@@ -15,9 +17,9 @@ use crate::scene::desc::Background;
 
 /// Points along each side of a pixel.
 const PER_PIXEL: usize = 4;
-/// Largest difference of the halves, over their mean, of a pixel that is taken: their mean is nearer to the truth than
-/// either, by a factor of four or more where the sky is at all smooth.
-const TOLERANCE: f32 = 2e-3;
+/// Largest sum, over the three ways, of half the difference of the halves, over the mean, of a pixel that is taken.
+/// Measured over all preset skies and three filters, errors of what is taken are below 0.44 of this.
+const TOLERANCE: f32 = 1e-3;
 
 /// Works out pixels; keeps its room from tile to tile.
 #[derive(Default)]
@@ -27,16 +29,16 @@ pub struct Backdrop {
     rays: RayBatch,
     li: Vec<Rgb>,
     more: Vec<Rgb>,
-    /// After the first axis: sums of all points and sums with alternating signs.
+    /// After the first axis, see [`fold`].
     rows: Vec<[Rgb; 2]>,
     /// By pixel of the tile.
     pixels: Vec<Option<Rgb>>,
     rect: PixelRect,
 }
 
-/// The filter's weight of each point along one axis about a pixel, first to last, together 1; None where the filter's edge
-/// lies between points.
-fn taps(filter: PixelFilter) -> Option<Vec<f32>> {
+/// What each point along one axis about a pixel counts for, first to last: the filter's weight, together 1, and half of
+/// what it adds to the difference of the halves, together 0. None where the filter's edge lies between points.
+fn taps(filter: PixelFilter) -> Option<Vec<[f32; 2]>> {
     let n = 2.0 * filter.radius() * PER_PIXEL as f32;
     if n.fract() != 0.0 || n < 1.0 {
         return None;
@@ -44,7 +46,9 @@ fn taps(filter: PixelFilter) -> Option<Vec<f32>> {
     let n = n as usize;
     let weight = |i: usize| filter.density(((i as f32 + 0.5) / n as f32 * 2.0 - 1.0) * filter.radius());
     let sum: f32 = (0..n).map(weight).sum();
-    Some((0..n).map(|i| weight(i) / sum).collect())
+    let sign = |i: usize| if matches!(i % PER_PIXEL, 0 | 3) { 1.0 } else { -1.0 };
+    let apart: f32 = (0..n).map(|i| weight(i) * sign(i)).sum::<f32>() / sum;
+    Some((0..n).map(|i| weight(i) / sum).enumerate().map(|(i, w)| [w, w * (sign(i) - apart)]).collect())
 }
 
 impl Backdrop {
@@ -67,7 +71,7 @@ impl Backdrop {
         self.pixels[self.rect.index(x, y)]
     }
 
-    fn fill_sky(&mut self, scene: &Scene, taps: &[f32], rect: PixelRect) {
+    fn fill_sky(&mut self, scene: &Scene, taps: &[[f32; 2]], rect: PixelRect) {
         // The first point of the first pixel's filter, in points from the pixel's left edge.
         let before = (taps.len() - PER_PIXEL) / 2;
         let span = |pixels: u32| pixels as usize * PER_PIXEL + 2 * before;
@@ -83,17 +87,18 @@ impl Backdrop {
         self.rows.clear();
         for row in self.li.chunks_exact(w) {
             for pixel in 0..rect.width() as usize {
-                self.rows.push(fold(taps, row[pixel * PER_PIXEL..].iter().map(|l| [*l; 2])));
+                self.rows.push(fold(taps, row[pixel * PER_PIXEL..].iter().copied()));
             }
         }
         let across = rect.width() as usize;
         for pixel in 0..rect.height() as usize {
             for column in 0..across {
                 let first = pixel * PER_PIXEL * across + column;
-                let [sum, apart] = fold(taps, self.rows[first..].iter().step_by(across).copied());
-                // The halves are the sum plus and minus what is apart.
-                let spread = apart.map(f32::abs).max_component() * 2.0;
-                let close = spread <= TOLERANCE * sum.map(f32::abs).max_component();
+                let part = |k: usize| fold(taps, self.rows[first..].iter().step_by(across).map(|r| r[k]));
+                let ([sum, rows], [columns, fields]) = (part(0), part(1));
+                // Halves are the sum plus and minus these.
+                let spread = rows.map(f32::abs) + columns.map(f32::abs) + fields.map(f32::abs);
+                let close = spread.max_component() <= TOLERANCE * sum.map(f32::abs).max_component();
                 self.pixels.push(close.then_some(sum));
             }
         }
@@ -121,12 +126,12 @@ impl Backdrop {
     }
 }
 
-/// Weighted sums of the first of each pair, and of the second with alternating signs.
-fn fold(taps: &[f32], points: impl Iterator<Item = [Rgb; 2]>) -> [Rgb; 2] {
+/// The weighted sum, and half of the difference of the halves.
+fn fold(taps: &[[f32; 2]], points: impl Iterator<Item = Rgb>) -> [Rgb; 2] {
     let mut sums = [Rgb::BLACK; 2];
-    for (i, (tap, [all, apart])) in taps.iter().zip(points).enumerate() {
-        sums[0] += all * *tap;
-        sums[1] += apart * if i % 2 == 0 { *tap } else { -*tap };
+    for (tap, point) in taps.iter().zip(points) {
+        sums[0] += point * tap[0];
+        sums[1] += point * tap[1];
     }
     sums
 }

@@ -9,7 +9,7 @@ use crate::base::camera::FilmSamples;
 use crate::base::pixel_rect::PixelRect;
 use crate::integrators::{CameraBatch, Integrator, PathId, PathIds, PathResults, Workspace};
 use crate::math::simd;
-use crate::sampler::{Dim, points_2d, ray_key};
+use crate::sampler::{Dim, PointSet, points_2d, ray_key};
 use crate::scene::Scene;
 use std::ops::Range;
 
@@ -74,6 +74,8 @@ pub struct Job<'a> {
     pub integrator: &'a dyn Integrator,
     /// The settings.
     pub settings: &'a RenderSettings,
+    /// The sample points that these come to.
+    pub points: PointSet,
     /// Which pixels see any geometry; None where all may.
     pub coverage: Option<&'a Coverage>,
 }
@@ -81,13 +83,13 @@ pub struct Job<'a> {
 impl<'a> Job<'a> {
     /// With a ray for every sample.
     pub fn new(scene: &'a Scene, integrator: &'a dyn Integrator, settings: &'a RenderSettings) -> Self {
-        Job { scene, integrator, settings, coverage: None }
+        Job { scene, integrator, settings, points: settings.points(), coverage: None }
     }
 }
 
-/// Indices of replicate `r` among the samples `range` of a pixel: sample s is number s / R of replicate s mod R.
-pub fn replicate_indices(range: &Range<u32>, r: u32) -> Range<u32> {
-    let first = |s: u32| s.saturating_sub(r).div_ceil(REPLICATES as u32);
+/// Indices of replicate `r` of `of` among the samples `range` of a pixel: sample s is number s / of of replicate s mod of.
+pub fn replicate_indices(range: &Range<u32>, r: u32, of: u32) -> Range<u32> {
+    let first = |s: u32| if r < of { s.saturating_sub(r).div_ceil(of) } else { 0 };
     first(range.start)..first(range.end)
 }
 
@@ -135,8 +137,9 @@ impl Worker {
         self.layers.reset(rect);
         self.batch.spread = job.scene.camera.pixel_spread();
         self.batch.want_first = !job.settings.aovs.is_empty();
+        let replicates = job.settings.replicates();
         let indices: [Range<u32>; REPLICATES] =
-            std::array::from_fn(|replicate| replicate_indices(&range, replicate as u32));
+            std::array::from_fn(|replicate| replicate_indices(&range, replicate as u32, replicates));
         let free = |x, y| job.coverage.is_some_and(|c| !c.is_covered(x, y));
         let has_free = job.coverage.is_some() && rect.pixels().any(|(x, y)| free(x, y));
         if has_free {
@@ -168,7 +171,7 @@ impl Worker {
     /// Adds a pixel that sees nothing without sampling it; false if it must be sampled all the same.
     fn spare(&mut self, x: u32, y: u32, indices: &[Range<u32>; REPLICATES]) -> bool {
         let Some(radiance) = self.backdrop.get(x, y) else { return false };
-        for (replicate, indices) in indices.iter().enumerate() {
+        for (replicate, indices) in indices.iter().enumerate().filter(|(_, indices)| !indices.is_empty()) {
             // Whether it fits depends on the radiance alone: all replicates or none.
             if !self.film.add_same(x, y, replicate, radiance, indices.len()) {
                 return false;
@@ -180,9 +183,8 @@ impl Worker {
 
     /// Notes a run: whose samples they are, and at which pixel.
     fn add_run(&mut self, job: &Job, run: Run) {
-        let s = job.settings;
         let end = run.start + run.len;
-        let sampler = s.sampler.pixel(s.seed, run.x, run.y, run.replicate);
+        let sampler = job.points.pixel(run.x, run.y, run.replicate);
         let key = ray_key(run.x, run.y, run.replicate);
         self.batch.ids.extend(PathId { sampler, index: run.first_index, key }, run.len);
         self.film_x.resize(end, run.x as f32 + 0.5);

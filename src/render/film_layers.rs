@@ -9,6 +9,8 @@ pub struct FilmLayer {
     pub name: &'static str,
     /// One line for `skylit list`.
     pub doc: &'static str,
+    /// Whether it shows [`super::settings::RenderSettings::moments`].
+    pub needs_moments: bool,
     /// Adds its planes.
     pub push: fn(&Film, &mut Picture),
 }
@@ -21,6 +23,7 @@ pub static REGISTRY: &[FilmLayer] = &[
     FilmLayer {
         name: "variance",
         doc: "variance of the pixel's mean, by channel, from two half-buffers, pooled over 5 x 5 pixels",
+        needs_moments: true,
         push: |film, picture| {
             let Some(planes) = film.variance(VARIANCE_RADIUS) else {
                 log::warn!("no variance: each half-buffer needs a sample, so give at least --spp 2");
@@ -34,6 +37,7 @@ pub static REGISTRY: &[FilmLayer] = &[
     FilmLayer {
         name: "spp",
         doc: "samples of the pixel",
+        needs_moments: false,
         push: |film, picture| {
             let counts = film.window().pixels().map(|(x, y)| film.sample_count(x, y) as f32).collect();
             picture.push("spp.V", SampleKind::Float, counts);

@@ -12,7 +12,7 @@ pub mod layers;
 pub mod settings;
 
 use crate::error::{Error, Result};
-use crate::integrators::{Integrator, PilotPlan, RayCounts, Specialised};
+use crate::integrators::{Avoided, Integrator, PilotPlan, RayCounts, Specialised};
 use crate::memory;
 use crate::scene::Scene;
 use adaptive::{Reached, Schedule, Task};
@@ -87,6 +87,8 @@ pub struct RenderStats {
     pub free_pixels: u64,
     /// Samples of those that needed no ray: their pixels got the filter's integral of what is behind everything.
     pub spared: u64,
+    /// Rays that were not needed; zeros of integrators that do not count them.
+    pub avoided: Avoided,
     /// Rays that were spent on deciding; among `rays`.
     pub pilot: RayCounts,
 }
@@ -172,6 +174,7 @@ impl Renderer {
         stats.seconds = start.elapsed().as_secs_f64();
         for w in lock(&workers).drain(..) {
             stats.rays.add(&w.work.counts);
+            stats.avoided.add(&w.work.avoided);
             stats.bad.extend(w.bad);
             stats.spared += w.spared;
         }

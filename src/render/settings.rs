@@ -4,7 +4,8 @@ use crate::base::pixel_rect::PixelRect;
 use crate::error::{Error, Result};
 use crate::render::adaptive::Target;
 use crate::render::aov::AovRow;
-use crate::sampler::Sampler;
+use crate::render::film::REPLICATES;
+use crate::sampler::{PointSet, Sampler};
 use crate::sampling::filter::PixelFilter;
 use crate::scene::desc::SceneDesc;
 use std::time::Duration;
@@ -31,6 +32,9 @@ pub struct RenderSettings {
     /// Whether pixels that no geometry projects into get the filter's integral of what is behind everything, where that
     /// is known to a thousandth, instead of samples.
     pub skip_background: bool,
+    /// Whether the film shall know how large its error is: each pixel's samples are then two independent randomisations,
+    /// which are less even together than one. Targets and time limits ask for that by themselves.
+    pub moments: bool,
     /// Whether the integrator may try out beforehand what suits the scene.
     pub pilot: bool,
     /// Worker threads, at least 1.
@@ -70,6 +74,7 @@ impl RenderSettings {
             sampler: Sampler::default(),
             filter: PixelFilter::default(),
             skip_background: true,
+            moments: false,
             pilot: true,
             threads: std::thread::available_parallelism().map_or(1, |n| n.get()),
             aovs: Vec::new(),
@@ -89,6 +94,22 @@ impl RenderSettings {
             filter: given.filter.as_deref().map(str::parse).transpose()?.unwrap_or(usual.filter),
             ..usual
         })
+    }
+
+    /// Independent randomisations of a pixel's points, at most [`REPLICATES`].
+    pub fn replicates(&self) -> u32 {
+        if self.moments || self.has_rounds() { REPLICATES as u32 } else { 1 }
+    }
+
+    /// The sample points of all pixels.
+    pub fn points(&self) -> PointSet {
+        let count = self.spp.div_ceil(self.replicates());
+        self.sampler.points(self.seed, (!self.has_rounds()).then_some(count))
+    }
+
+    /// Whether what was sampled decides how many samples pixels get.
+    fn has_rounds(&self) -> bool {
+        self.target.is_some() || self.time.is_some()
     }
 
     /// Checks what the types cannot.

@@ -4,6 +4,7 @@ pub mod dims;
 pub mod hash;
 pub mod independent;
 pub mod owen_sobol;
+pub mod zsobol;
 
 use std::str::FromStr;
 
@@ -15,9 +16,12 @@ use crate::math::simd::{Kernel, dispatch};
 
 /// The kinds of sample points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[repr(u32)]
 pub enum Sampler {
-    /// Owen-scrambled Sobol' pairs, see [`owen_sobol`]: error on smooth light falls faster than 1/sqrt(n).
+    /// Owen-scrambled Sobol' pairs whose errors differ from pixel to pixel like blue noise, see [`zsobol`].
     #[default]
+    ZSobol,
+    /// Owen-scrambled Sobol' pairs, independent from pixel to pixel, see [`owen_sobol`].
     OwenSobol,
     /// Independent uniform numbers, for comparison and for statistics that assume them.
     Independent,
@@ -25,20 +29,23 @@ pub enum Sampler {
 
 impl Sampler {
     /// Names as the command line and scene files spell them, each with its kind.
-    pub const NAMES: [(&'static str, Sampler); 2] =
-        [("owen-sobol", Sampler::OwenSobol), ("independent", Sampler::Independent)];
+    pub const NAMES: [(&'static str, Sampler); 3] = [
+        ("zsobol", Sampler::ZSobol),
+        ("owen-sobol", Sampler::OwenSobol),
+        ("independent", Sampler::Independent),
+    ];
 
     /// The name of this kind.
     pub fn name(self) -> &'static str {
-        match self {
-            Sampler::OwenSobol => "owen-sobol",
-            Sampler::Independent => "independent",
-        }
+        Self::NAMES.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
     }
 
     /// One line for people.
     pub fn doc(self) -> &'static str {
         match self {
+            Sampler::ZSobol => {
+                "Owen-scrambled Sobol' pairs along a curve through all pixels: errors of neighbours cancel (blue noise)"
+            }
             Sampler::OwenSobol => {
                 "Owen-scrambled Sobol' pairs: error on smooth light falls faster than 1/sqrt(n)"
             }
@@ -46,9 +53,38 @@ impl Sampler {
         }
     }
 
-    /// The points of one pixel; see [`PixelSampler::new`].
-    pub fn pixel(self, seed: u64, x: u32, y: u32, replicate: u32) -> PixelSampler {
-        PixelSampler::new(seed, x, y, replicate).of_kind(self)
+    /// The points of a picture whose pixels take `count` samples of each replicate, if that is known beforehand.
+    /// [`Sampler::ZSobol`] needs to know; its points are else those of [`Sampler::OwenSobol`].
+    pub fn points(self, seed: u64, count: Option<u32>) -> PointSet {
+        let kind = match (self, count) {
+            (Sampler::ZSobol, None) => Sampler::OwenSobol,
+            (kind, _) => kind,
+        };
+        PointSet { kind, seed, bits: count.map_or(0, |n| n.max(1).next_power_of_two().trailing_zeros()) }
+    }
+}
+
+/// The sample points of all pixels and replicates of a picture.
+#[derive(Debug, Clone, Copy)]
+pub struct PointSet {
+    kind: Sampler,
+    seed: u64,
+    /// Of [`Sampler::ZSobol`]: the binary logarithm of the samples of a pixel.
+    bits: u32,
+}
+
+impl PointSet {
+    /// Those of pixel (x, y). Another `replicate` gives an independent randomisation of the same pixel: the variance
+    /// between replicates is an unbiased estimate of that of the mean of one.
+    pub fn pixel(&self, x: u32, y: u32, replicate: u32) -> PixelSampler {
+        let seed = hash::mix64(self.seed);
+        let [region, second] = match self.kind {
+            Sampler::ZSobol => zsobol::place([x, y], self.bits).map(u64::from),
+            _ => [(u64::from(y) << 32) | u64::from(x), 0],
+        };
+        let h = hash::mix64(hash::mix64(seed ^ region).wrapping_add(u64::from(replicate)));
+        let second = if self.kind == Sampler::ZSobol { second as u32 } else { (h >> 32) as u32 };
+        PixelSampler { key: [(h as u32 & !3) | self.kind as u32, second] }
     }
 }
 
@@ -77,34 +113,27 @@ fn to_unit_f32(bits: u32) -> f32 {
 /// points are stratified, best so over the first 2^k of them. Eight bytes: keep it in the path state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PixelSampler {
-    /// Hash of seed, pixel and replicate; the last bit of the second half tells the kind (1: independent).
+    /// Hash of seed, pixel and replicate, but that the last two bits of the first half tell the kind, and that the second
+    /// half, of [`Sampler::ZSobol`], is the index of the pixel's first point.
     key: [u32; 2],
 }
 
 impl PixelSampler {
-    /// Owen-scrambled points of pixel (x, y). Another `replicate` gives an independent randomisation of the same
-    /// pixel: the variance between replicates is an unbiased estimate of that of the mean of one.
-    pub fn new(seed: u64, x: u32, y: u32, replicate: u32) -> Self {
-        let pixel = (u64::from(y) << 32) | u64::from(x);
-        let h = hash::mix64(hash::mix64(hash::mix64(seed) ^ pixel).wrapping_add(u64::from(replicate)));
-        PixelSampler { key: [h as u32, (h >> 32) as u32] }.of_kind(Sampler::OwenSobol)
-    }
-
-    fn of_kind(self, kind: Sampler) -> Self {
-        let bit = u32::from(kind == Sampler::Independent);
-        PixelSampler { key: [self.key[0], (self.key[1] & !1) | bit] }
-    }
-
     /// The kind of points it gives.
     #[inline(always)]
     pub fn kind(&self) -> Sampler {
-        if self.key[1] & 1 == 0 { Sampler::OwenSobol } else { Sampler::Independent }
+        match self.key[0] & 3 {
+            0 => Sampler::ZSobol,
+            1 => Sampler::OwenSobol,
+            _ => Sampler::Independent,
+        }
     }
 
     /// Two numbers in [0, 1) as 32-bit fractions.
     #[inline(always)]
     pub fn bits_2d(&self, index: u32, dim: Dim) -> [u32; 2] {
         match self.kind() {
+            Sampler::ZSobol => zsobol::pair(self.key, dim).point(zsobol::index(self.key, index)),
             Sampler::OwenSobol => owen_sobol::Pair::new(self.key, dim).point(index),
             Sampler::Independent => independent::point(self.key, dim, index),
         }
@@ -133,6 +162,7 @@ impl PixelSampler {
     #[inline(always)]
     pub fn get_1d(&self, index: u32, dim: Dim) -> f32 {
         to_unit_f32(match self.kind() {
+            Sampler::ZSobol => zsobol::pair(self.key, dim).first(zsobol::index(self.key, index)),
             Sampler::OwenSobol => owen_sobol::Pair::new(self.key, dim).first(index),
             Sampler::Independent => independent::point(self.key, dim, index)[0],
         })
@@ -167,6 +197,13 @@ impl Kernel for FillPixel<'_> {
         let slots = out_x.iter_mut().zip(out_y.iter_mut()).zip(0u32..);
         let (dim, first) = (self.dim, self.first_index);
         match self.sampler.kind() {
+            Sampler::ZSobol => {
+                let pair = zsobol::pair(key, dim);
+                for ((x, y), i) in slots {
+                    let index = zsobol::index(key, first.wrapping_add(i));
+                    [*x, *y] = pair.point(index).map(to_unit_f32);
+                }
+            }
             Sampler::OwenSobol => {
                 let pair = owen_sobol::Pair::new(key, dim);
                 for ((x, y), i) in slots {
@@ -198,6 +235,12 @@ impl Kernel for FillPaths<'_> {
         let [out_x, out_y] = self.out;
         let slots = out_x.iter_mut().zip(out_y.iter_mut()).zip(self.pixels).zip(self.indices);
         match first.kind() {
+            Sampler::ZSobol => {
+                for (((x, y), pixel), &index) in slots {
+                    let index = zsobol::index(pixel.key, index);
+                    [*x, *y] = zsobol::pair(pixel.key, self.dim).point(index).map(to_unit_f32);
+                }
+            }
             Sampler::OwenSobol => {
                 for (((x, y), pixel), &index) in slots {
                     [*x, *y] = owen_sobol::Pair::new(pixel.key, self.dim).point(index).map(to_unit_f32);

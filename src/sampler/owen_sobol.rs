@@ -47,8 +47,13 @@ impl Pair {
     /// The pair of dimension `dim` of the pixel with this key.
     #[inline(always)]
     pub(super) fn new(key: [u32; 2], dim: Dim) -> Self {
-        let order = mix32(key[0] ^ dim.0.wrapping_mul(0x9e37_79b9));
-        let x = mix32(order ^ key[1]);
+        Self::of_seeds(mix32(key[0] ^ dim.0.wrapping_mul(0x9e37_79b9)), key[1])
+    }
+
+    /// The pair with this order, scrambled by a second seed.
+    #[inline(always)]
+    pub(super) fn of_seeds(order: u32, second: u32) -> Self {
+        let x = mix32(order ^ second);
         Pair { order, x, y: mix32(x.wrapping_add(0x85eb_ca6b)) }
     }
 

@@ -7,7 +7,7 @@ fn dims() -> [Dim; 4] {
 #[test]
 fn every_elementary_interval_of_aligned_blocks_holds_one_point() {
     for (x, y, replicate) in [(0, 0, 0), (17, 4, 0), (4000, 2999, 3)] {
-        let p = PixelSampler::new(1, x, y, replicate);
+        let p = Sampler::OwenSobol.points(1, None).pixel(x, y, replicate);
         for dim in dims() {
             for m in 0..=10u32 {
                 for block in [0u32, 1, 5] {
@@ -28,8 +28,10 @@ fn every_elementary_interval_of_aligned_blocks_holds_one_point() {
 
 #[test]
 fn batches_and_scalars_agree_to_the_bit() {
-    for kind in [Sampler::OwenSobol, Sampler::Independent] {
-        let p = kind.pixel(9, 5, 6, 0);
+    for (_, kind) in Sampler::NAMES {
+        let points = kind.points(9, Some(128));
+        let p = points.pixel(5, 6, 0);
+        assert_eq!(p.kind(), kind);
         let dim = Dim::LENS;
         let (mut xs, mut ys) = (vec![0.0; 77], vec![0.0; 77]);
         p.fill_2d(13, dim, &mut xs, &mut ys);
@@ -40,7 +42,7 @@ fn batches_and_scalars_agree_to_the_bit() {
             let step = 1.0 / 16_777_216.0;
             assert!((0..2).all(|k| (0.0..step).contains(&(fine[k] - f64::from([xs[i], ys[i]][k])))));
         }
-        let pixels: Vec<_> = (0..77).map(|i| kind.pixel(9, i, 2 * i, 0)).collect();
+        let pixels: Vec<_> = (0..77).map(|i| points.pixel(i, 2 * i, 0)).collect();
         let indices: Vec<u32> = (0..77).map(|i| i * i).collect();
         points_2d(&pixels, &indices, dim, &mut xs, &mut ys);
         for i in 0..77 {
@@ -62,14 +64,15 @@ fn largest_bits_stay_below_one() {
 fn randomisation_is_uniform_and_independent() {
     let n = 40_000u32;
     for kind in [Sampler::OwenSobol, Sampler::Independent] {
-        let draw = |i: u32, index: u32, dim: Dim| kind.pixel(3, i % 200, i / 200, 0).get_2d(index, dim);
+        let draw =
+            |i: u32, index: u32, dim: Dim| kind.points(3, None).pixel(i % 200, i / 200, 0).get_2d(index, dim);
         let other: [&dyn Fn(u32) -> [f32; 2]; 6] = [
             &|i| draw(i, 0, Dim::LENS),
             &|i| draw(i, 0, Dim::at(1, Slot::LightUv)),
             &|i| draw(i + 1, 0, Dim::FILTER),
             &|i| draw(i + 200, 0, Dim::FILTER),
-            &|i| kind.pixel(4, i % 200, i / 200, 0).get_2d(0, Dim::FILTER),
-            &|i| kind.pixel(3, i % 200, i / 200, 1).get_2d(0, Dim::FILTER),
+            &|i| kind.points(4, None).pixel(i % 200, i / 200, 0).get_2d(0, Dim::FILTER),
+            &|i| kind.points(3, None).pixel(i % 200, i / 200, 1).get_2d(0, Dim::FILTER),
         ];
         let mut sum = [0f64; 2];
         let mut square = [0f64; 2];
@@ -105,9 +108,10 @@ fn randomisation_is_uniform_and_independent() {
 /// Mean squared error of the mean of `n` samples over many pixels.
 fn mse(kind: Sampler, n: u32, f: &dyn Fn(&PixelSampler, u32) -> f64, exact: f64) -> f64 {
     let pixels = 256;
+    let points = kind.points(11, Some(n));
     let total: f64 = (0..pixels)
         .map(|i| {
-            let p = kind.pixel(11, i, 3 * i, 0);
+            let p = points.pixel(i, 3 * i, 0);
             let mean = (0..n).map(|s| f(&p, s)).sum::<f64>() / f64::from(n);
             (mean - exact).powi(2)
         })

@@ -6,6 +6,7 @@ use skylit::color::Rgb;
 use skylit::integrators;
 use skylit::render::settings::RenderSettings;
 use skylit::render::{Rendered, Renderer, Silent};
+use skylit::sampler::Sampler;
 use skylit::scene::build::{BuildOptions, build};
 use skylit::scene::{Scene, desc::SceneDesc};
 
@@ -63,9 +64,14 @@ pub fn render_rays(
     Renderer { integrator, settings }.render(scene, &Silent).unwrap()
 }
 
-/// Settings for the film that the scene's camera fills.
+/// Settings for the film that the scene's camera fills: with moments, and pixels that are independent of each other, so
+/// that tests know how sure a mean is.
 pub fn settings(scene: &Scene) -> RenderSettings {
-    RenderSettings::new([scene.film.width, scene.film.height])
+    RenderSettings {
+        moments: true,
+        sampler: Sampler::OwenSobol,
+        ..RenderSettings::new([scene.film.width, scene.film.height])
+    }
 }
 
 /// Mean radiance over the whole film and its standard error, from the pixels' half-buffers.

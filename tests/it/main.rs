@@ -18,6 +18,7 @@ mod light;
 mod matches;
 mod open_house;
 mod pictures;
+mod points;
 mod product;
 mod reference;
 mod seeds;

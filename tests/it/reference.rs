@@ -20,6 +20,7 @@ fn compare(name: &str, systematic: f64) {
         spp: 1024,
         filter: PixelFilter::Box,
         threads: 2,
+        moments: true,
         ..RenderSettings::new([width as u32, height as u32])
     };
     let integrator = integrator("path", &[("max_depth", 6.0), ("roulette_depth", 100.0)]);

@@ -7,6 +7,7 @@
 
 pub mod analyse;
 pub mod measure;
+pub mod peers;
 pub mod present;
 pub mod record;
 pub mod reference;

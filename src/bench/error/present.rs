@@ -2,6 +2,7 @@
 
 use super::analyse::{Curve, Estimate, Interval, Reach, SpeedUp, speed_up};
 use super::measure::PixelSet;
+use super::peers;
 use super::record::{Record, ReferenceRecord, SceneRecord, Series};
 use crate::report::lines::{Axis, Line, Lines};
 use crate::report::table::{Cell, Column, Table, Tone};
@@ -197,6 +198,9 @@ pub fn text(records: &[&Record], set: PixelSet) -> String {
         out += &scene.points_table(set).to_text();
         out += &format!("\n{}\n", scene.summary_table(set).to_text());
     }
+    if let Some(table) = peers::table(records, set) {
+        out += &format!("times as long to the same error\n\n{}\n", table.to_text());
+    }
     out
 }
 
@@ -214,6 +218,9 @@ pub fn page(records: &[&Record], set: PixelSet, shown: Vec<Shown>, report: Repor
     }
     let names: Vec<&str> = scenes.iter().map(|s| s.name).collect();
     let mut report = report.subtitle(names.join(", ")).verdict(Verdict::neutral(verdict(&scenes, set)));
+    if let Some(table) = peers::table(records, set) {
+        report = report.section(Section::new("Times as long to the same error").with(table));
+    }
     for (scene, pictures) in scenes.iter().zip(pictures) {
         let mut section = Section::new(scene.name)
             .with(scene.plot(set))

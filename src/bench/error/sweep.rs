@@ -54,6 +54,10 @@ pub static KEYS: &[Key] = &[
         s.settings.skip_background = choose("sky pixels", v, &[("integrate", true), ("sample", false)])?;
         Ok(())
     }),
+    Key::new("moments", "whether a render knows its own error", |s, v| {
+        s.settings.moments = choose("moments", v, &[("true", true), ("false", false)])?;
+        Ok(())
+    }),
     Key::new("backend", "ray kernel", set_backend),
     Key::new("kernel-mode", "robust or fast", set_mode),
     Key::new("build", "speed of the kernel's build", set_quality),

@@ -325,7 +325,7 @@ fn from_candidates(count: usize, ray: impl Fn(usize) -> Option<Ray> + Sync) -> V
 
 /// Two random numbers of a candidate, independent of all others.
 fn random(kind: RayKind, i: u32, which: u32) -> [f32; 2] {
-    Sampler::Independent.pixel(SEED, i, kind as u32, which).get_2d(0, Dim::FILTER)
+    Sampler::Independent.points(SEED, None).pixel(i, kind as u32, which).get_2d(0, Dim::FILTER)
 }
 
 fn key(kind: RayKind, i: u32) -> u32 {

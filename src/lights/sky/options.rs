@@ -10,7 +10,8 @@ pub enum SkySampling {
     /// sampling.
     Product,
     /// By the luminance that rises above the average, where that pays: BSDF sampling finds the rest as well (Karlik et
-    /// al. 2019). Under a constant sky nothing is left and there is no sample.
+    /// al. 2019). Under a constant sky nothing is left and there is no sample. The best use of time under most skies
+    /// (measured: benches/README.md).
     #[default]
     Compensated,
     /// By luminance.

@@ -148,14 +148,18 @@ impl Level {
 
     /// Second moment of the map's part if a share of the samples goes to a table with this floor.
     fn moment(&self, floor: f64, share: f64) -> f64 {
-        let n = self.integral.len();
-        let total = ordered_sum(n, |i| self.weight(i, floor));
+        let density = self.densities(floor, share);
+        ordered_sum(self.integral.len(), |i| self.square(i) * second_moment(density(i)))
+    }
+
+    /// The density per solid angle of such samples, by cell.
+    fn densities(&self, floor: f64, share: f64) -> impl Fn(usize) -> f64 + Sync {
+        let total = ordered_sum(self.integral.len(), |i| self.weight(i, floor));
         let scale = if total > 0.0 { share / total } else { 0.0 };
-        ordered_sum(n, |i| {
-            let w = self.weight(i, floor);
-            let p = if w > 0.0 { w * scale / self.solid_angle[i] } else { 0.0 };
-            self.square(i) * second_moment(p)
-        })
+        move |i| match self.weight(i, floor) {
+            w if w > 0.0 => w * scale / self.solid_angle[i],
+            _ => 0.0,
+        }
     }
 }
 
@@ -190,8 +194,10 @@ fn solid_angles(sky: &dyn Skybox, grid: ChartGrid) -> Vec<f64> {
     (0..grid.cells()).into_par_iter().with_min_len(1024).map(cell).collect()
 }
 
-/// The mean over receivers' normals of (E / pi)^2: what second moments exceed by the variance.
-fn mean_square(sky: &dyn Skybox, level: &Level) -> f64 {
+/// What second moments exceed by the variance: the mean over receivers' normals of the squared expectations of both
+/// samples, which are independent of each other. `share` of the sky's samples go to a table with this floor, `disc_share`
+/// to the discs. On a coarse level, whose cells have the light of their middles.
+fn mean_squares(sky: &dyn Skybox, level: &Level, floor: f64, share: f64, disc_share: f64) -> f64 {
     let ChartGrid { width, height, .. } = level.grid;
     let (w, h) = (width as usize, height as usize);
     let mut normals = Vec::new();
@@ -200,21 +206,28 @@ fn mean_square(sky: &dyn Skybox, level: &Level) -> f64 {
             DVec3::new(f64::from(k % 3 - 1), f64::from(k / 3 % 3 - 1), f64::from(k / 9 - 1)).normalize(),
         );
     }
-    let mut irradiance = vec![0.0; normals.len()];
-    let mut add = |d: DVec3, flux: f64| {
-        for (e, n) in irradiance.iter_mut().zip(&normals) {
-            *e += d.dot(*n).max(0.0) * flux;
+    // Of the cosine lobe's sample and of the sky's.
+    let mut expected = vec![[0.0; 2]; normals.len()];
+    let mut add = |d: DVec3, flux: f64, p2: f64| {
+        for (e, n) in expected.iter_mut().zip(&normals) {
+            let p1 = d.dot(*n).max(0.0) / PI;
+            if p1 > 0.0 {
+                e[0] += flux * p1 * (p1 / (p1 + p2));
+                e[1] += flux * p1 * (p2 / (p1 + p2));
+            }
         }
     };
+    let density = level.densities(floor, share);
     for (i, &flux) in level.integral.iter().enumerate() {
         let u = ((i % w) as f64 + 0.5) / f64::from(width);
         let v = ((i / w % h) as f64 + 0.5) / f64::from(height);
-        add(sky.direction(ChartPoint { chart: (i / (w * h)) as u32, u, v }), flux);
+        add(sky.direction(ChartPoint { chart: (i / (w * h)) as u32, u, v }), flux, density(i));
     }
-    for disc in sky.discs() {
-        add(disc.toward, f64::from(disc.radiance.luminance()) * disc.solid_angle());
+    let discs = Discs::of(sky);
+    for ((disc, (flux, omega)), share) in sky.discs().iter().zip(&discs.0).zip(discs.shares(disc_share)) {
+        add(disc.toward, *flux, share / omega);
     }
-    irradiance.iter().map(|e| (e / PI).powi(2)).sum::<f64>() / normals.len() as f64
+    expected.iter().map(|[a, b]| a * a + b * b).sum::<f64>() / normals.len() as f64
 }
 
 /// Fluxes and solid angles of discs.
@@ -245,9 +258,8 @@ impl Discs {
 }
 
 /// Decides on a sky that is not constant.
-pub(super) fn plan(sky: &dyn Skybox, sampling: SkySampling) -> Plan {
+pub(super) fn plan(sky: &dyn Skybox, levels: &[Level], sampling: SkySampling) -> Plan {
     let discs = Discs::of(sky);
-    let levels = Level::all(sky);
     let finest = &levels[0];
     let n = finest.integral.len();
     let map_total = ordered_sum(n, |i| finest.integral[i]);
@@ -270,9 +282,11 @@ pub(super) fn plan(sky: &dyn Skybox, sampling: SkySampling) -> Plan {
     if map_share <= 0.0 || matches!(sampling, SkySampling::Cosine) {
         return Plan { table: None, map_share, disc_shares, map_total };
     }
-    let known = mean_square(sky, trial);
-    let variance =
-        |l: &Level, share: f64| (l.moment(floor, share) + discs.moment(disc_share) - known).max(1e-3 * known);
+    // What the model takes to be the same in all cells leaves some of the variance open.
+    let variance = |l: &Level, share: f64| {
+        let known = mean_squares(sky, trial, floor, share, disc_share);
+        (l.moment(floor, share) + discs.moment(disc_share) - known).max(1e-3 * known)
+    };
     let best = variance(finest, map_share);
     if discs.total() <= 0.0
         && matches!(sampling, SkySampling::Compensated)

@@ -121,7 +121,7 @@ fn stratified_points_stay_stratified() {
     // where random ones would differ by sqrt(64) = 8 and up to 25.
     let weight: Vec<f64> = (0..64).map(|i| 1.0 + f64::from(i % 8) * 0.2 + f64::from(i / 8) * 0.1).collect();
     let d = ChartDistribution::new(1, 8, 8, &weight).unwrap();
-    let p = crate::sampler::PixelSampler::new(1, 2, 3, 0);
+    let p = crate::sampler::Sampler::OwenSobol.points(1, None).pixel(2, 3, 0);
     let mut counts = [0f64; 64];
     for i in 0..4096 {
         let c = d.sample(p.get_2d_f64(i, crate::sampler::Dim::FILTER));

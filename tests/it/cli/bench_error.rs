@@ -17,7 +17,20 @@ fn error_is_measured_against_time_and_kept() {
     assert_eq!(series[0]["points"][1]["runs"].as_array().map(Vec::len), Some(2));
     // With what it kept, a record of its own stands beside itself.
     let again = f.run(&format!("{command} --with r.json")).succeeds();
-    assert_eq!(again.stdout.matches("sampler=independent").count(), 2 * (2 + 1));
+    let rows = |text: &str| text.lines().filter(|l| l.starts_with("sampler=independent")).count();
+    assert_eq!(rows(&again.stdout), 2 * (2 + 1));
+    // A record in a scene's place is shown without being measured; with another, times to the same error are compared.
+    let shown = f.run("bench error r.json --with r.json --svg s.svg --html s.html").succeeds();
+    assert_eq!(rows(&shown.stdout), 2 * (2 + 1));
+    let (_, compared) = shown.stdout.split_once("times as long to the same error").unwrap();
+    // Below the heading.
+    let scene = compared.lines().filter(|l| l.starts_with("scene ")).nth(1).unwrap();
+    let mean = compared.lines().find(|l| l.starts_with("geometric mean")).unwrap();
+    // The same curves: of the best settings it takes no longer than of the first.
+    for line in [scene, mean] {
+        assert!(line.split_whitespace().last().unwrap().parse::<f64>().unwrap() <= 1.0, "{line}");
+    }
+    f.refuses("bench error r.json scene.toml", 2, &["as it is", "--with"]);
     let files = std::fs::read_dir(f.path().join("r.references")).unwrap().count();
     assert_eq!(files, 1);
     let read = |name: &str| std::fs::read_to_string(f.path().join(name)).unwrap();
@@ -61,4 +74,27 @@ fn pixels_of_sky_alone_are_skipped_and_counted() {
     // The pilot's rays are the same in both.
     assert_eq!(camera(&skipped) + spared, camera(&sampled));
     f.refuses("render scene.toml -o a.png --sky-pixels trace", 2, &["--sky-pixels", "integrate"]);
+}
+
+/// All of a camera ray a sample, and a shadow and a scattered ray a surface point, were traced or are told.
+#[test]
+fn every_ray_that_was_not_traced_has_its_cause() {
+    let f = Folder::new();
+    let text = std::fs::read_to_string(f.path().join("scene.toml")).unwrap();
+    for sky in ["gradient", "midday", "constant"] {
+        f.write("lit.toml", text.replace("\"constant\"", &format!("\"{sky}\"")));
+        for flags in
+            ["--integrator direct", "--integrator path", "--sky-sampling product", "--sky-pixels sample"]
+        {
+            f.run(&format!("render lit.toml --size 64x48 --spp 64 -o a.exr --stats s.json {flags}"))
+                .succeeds();
+            let s = f.json("s.json");
+            assert!(s["skipped"]["surface_points"].as_u64().unwrap() > 0, "{sky} {flags}");
+            let explained = s["skipped"]["explained"].as_f64().unwrap();
+            assert!((explained - 1.0).abs() < 1e-12, "{sky} {flags}: {}", s["skipped"]);
+        }
+        let info = f.run("info lit.toml --json i.json").succeeds();
+        assert!(info.stdout.contains("which no geometry projects into"), "{}", info.stdout);
+        assert!(f.json("i.json")["skips"].as_array().is_some_and(|s| s.len() > 2));
+    }
 }

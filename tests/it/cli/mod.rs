@@ -4,6 +4,7 @@ mod bad_input;
 mod bench;
 mod bench_error;
 mod crosscheck;
+mod denoise;
 mod folder;
 #[cfg(target_os = "linux")]
 mod memory;

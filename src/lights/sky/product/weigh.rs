@@ -135,13 +135,13 @@ impl Kernel for Sum<'_> {
     fn run(self) {
         let mut total = 0.0;
         for (row, sum) in self.weights.chunks_exact(self.stride).zip(self.sums) {
-            let mut lanes = [0f64; LANES];
+            let mut lanes = [0f32; LANES];
             for eight in row.chunks_exact(LANES) {
                 for (lane, w) in lanes.iter_mut().zip(eight) {
-                    *lane += f64::from(*w);
+                    *lane += *w;
                 }
             }
-            let of_row: f64 = lanes.iter().sum();
+            let of_row: f64 = lanes.iter().map(|l| f64::from(*l)).sum();
             // A row without weight adds nothing, so that it is never chosen.
             total += of_row;
             *sum = total;
