@@ -8,6 +8,7 @@ mod denoise;
 mod folder;
 #[cfg(target_os = "linux")]
 mod memory;
+mod skies;
 mod target;
 
 use folder::{Folder, QUICK};
