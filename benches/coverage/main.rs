@@ -7,10 +7,9 @@
 //! scene passes unless a one-sided binomial test rejects, at 1 %, that either has a probability of at least 95 %. Exit code
 //! 1 if one does not pass.
 
-// The tests use more of both than this program does.
-#[expect(dead_code)]
 #[path = "../../tests/it/adaptive/cases.rs"]
 mod cases;
+// The tests use more of it than this program does.
 #[expect(dead_code)]
 #[path = "../../tests/it/common.rs"]
 mod common;
