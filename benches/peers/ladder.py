@@ -3,6 +3,7 @@
 A peer is a class with
     NAME                       for file names
     program                    name and version, for the record
+    maker                      the same of what makes references, where several programs share them
     series()                   list of {"name", "settings", optionally "most": largest number of samples}; the first
                                makes the reference
     open(scene)                loads what `Scene` describes
@@ -96,7 +97,7 @@ def half(peer, series, spp, seed, pixels):
 def reference(peer, scene, a):
     """The one that was kept, or a new one. Kept ones belong to the scene's description and the peer's version."""
     with open(scene.path(f"{scene.name}.json"), "rb") as f:
-        key = f"{zlib.crc32(f.read() + peer.program.encode()):08x}"
+        key = f"{zlib.crc32(f.read() + getattr(peer, 'maker', peer.program).encode()):08x}"
     w, h = scene.size
     folder = scene.path("references")
     path = os.path.join(folder, f"{scene.name}-{peer.NAME}-{w}x{h}-{a.reference_spp}-{key}.exr")

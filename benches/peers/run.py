@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Everything: error against time of skylit and its peers on the scenes of scenes.py, and the tables and plots of them.
 
-    python3 benches/peers/run.py DIR --json OUTDIR [--peers skylit,mitsuba,cycles,lux] [--scenes NAME,...] [options]
+    python3 benches/peers/run.py DIR --json OUTDIR [--peers skylit,mitsuba,mitsuba-scalar,cycles,lux] [--scenes NAME,...] [options]
 
 Each renderer runs in a process of its own, one after the other, and writes OUTDIR/NAME.json; then all records that stand
 in OUTDIR are drawn as OUTDIR/all.html and all.txt, a plot of each scene as SCENE.svg. Where one fails, the others go on.
@@ -20,7 +20,8 @@ HOME = os.path.dirname(os.path.abspath(__file__))
 # Names of records, with the words of their commands.
 PEERS = {
     "skylit": [["skylit"]],
-    "mitsuba": [["mitsuba-llvm", "peer_mitsuba.py"], ["mitsuba-scalar", "peer_mitsuba.py", "--variant", "scalar_rgb"]],
+    "mitsuba": [["mitsuba-llvm", "peer_mitsuba.py"]],
+    "mitsuba-scalar": [["mitsuba-scalar", "peer_mitsuba.py", "--variant", "scalar_rgb"]],
     "cycles": [["cycles", "peer_cycles.py"]],
     "lux": [["lux", "peer_lux.py"]],
 }
