@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::image::write::{check_file, write_file};
 use crate::math::aabb::DAabb;
 use crate::memory::in_words;
+use crate::render::backdrop::pays;
 use crate::render::coverage::Coverage;
 use crate::render::film::BYTES_PER_PIXEL;
 use crate::render::settings::RenderSettings;
@@ -188,7 +189,8 @@ fn skips(scene: &Scene, spp: Option<u32>) -> Vec<String> {
     let size = [scene.film.width, scene.film.height];
     let usual = RenderSettings::new(size);
     let coverage = Coverage::of(scene, usual.crop, usual.filter, spp.unwrap_or(usual.spp));
-    let free = coverage.map_or(0.0, |c| c.free() as f64 / usual.crop.area() as f64);
+    let pays = |c: &Coverage| pays(scene, usual.filter, c, usual.crop, spp.unwrap_or(usual.spp));
+    let free = coverage.filter(pays).map_or(0.0, |c| c.free() as f64 / usual.crop.area() as f64);
     let (f, lights) = (&scene.features, &scene.lights);
     let mut out = Vec::new();
     if free > 0.0 {

@@ -9,11 +9,12 @@ use crate::base::camera::Projection;
 use crate::base::geometry::{Geometry, Group, Leaf};
 use crate::base::pixel_rect::PixelRect;
 use crate::base::shape::Shape;
-use crate::math::aabb::DAabb;
+use crate::math::aabb::{Aabb, DAabb};
 use crate::memory;
 use crate::sampling::filter::PixelFilter;
 use crate::scene::Scene;
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec3, Vec3};
+use rayon::prelude::*;
 use std::collections::HashMap;
 
 /// Rays in single precision miss their place on the film by 1e-4 pixels at most.
@@ -29,7 +30,11 @@ const SMALL: usize = 9;
 /// Primitives under a lowest box, and boxes under each above.
 const FAN: usize = 8;
 /// Nanoseconds, roughly, of projecting a primitive, and of a sample that is saved: what is worth the trouble.
-const COSTS: [u64; 2] = [40, 60];
+const COSTS: [u64; 2] = [100, 45];
+/// Fewer samples of a pixel cost no more than the lookups that take their place.
+const LEAST_SPP: u32 = 16;
+/// Boxes at least among which threads share the work of a shape.
+const SHARED: usize = 32;
 
 /// Marks by pixel.
 pub struct Coverage {
@@ -39,23 +44,36 @@ pub struct Coverage {
 
 /// Boxes over runs of a shape's primitives, level by level: each of [`FAN`] of the one before.
 struct Runs {
-    levels: Vec<Vec<DAabb>>,
+    levels: Vec<Vec<Aabb>>,
 }
 
 impl Runs {
     fn new(shape: &dyn Shape) -> Self {
         let n = shape.primitive_count() as usize;
-        let union = |boxes: &mut dyn Iterator<Item = DAabb>| boxes.fold(DAabb::EMPTY, |a, b| a.union(b));
-        let lowest = (0..n.div_ceil(FAN)).map(|run| {
-            let end = ((run + 1) * FAN).min(n);
-            union(&mut (run * FAN..end).map(|p| DAabb::from(shape.primitive_bounds(p as u32))))
-        });
-        let mut levels: Vec<Vec<DAabb>> = vec![lowest.collect()];
+        let union = |boxes: &[Aabb]| boxes.iter().fold(Aabb::EMPTY, |a, b| a.union(*b));
+        let lowest = |run: usize| {
+            let of_run = run * FAN..((run + 1) * FAN).min(n);
+            let Some(mesh) = shape.triangles() else {
+                return of_run.fold(Aabb::EMPTY, |all, p| all.union(shape.primitive_bounds(p as u32)));
+            };
+            let mut all = Aabb::EMPTY;
+            for i in mesh.indices[of_run].iter().flatten() {
+                all.extend(Vec3::from(mesh.positions()[*i as usize]));
+            }
+            all
+        };
+        let lowest = (0..n.div_ceil(FAN)).into_par_iter().with_min_len(512).map(lowest);
+        let mut levels: Vec<Vec<Aabb>> = vec![lowest.collect()];
         while let Some(last) = levels.last().filter(|l| l.len() > 1) {
-            let next = last.chunks(FAN).map(|run| union(&mut run.iter().copied())).collect();
+            let next = last.chunks(FAN).map(union).collect();
             levels.push(next);
         }
         Runs { levels }
+    }
+
+    /// The coarsest level that threads can share; that of the single box on top if there is none.
+    fn shared(&self) -> usize {
+        self.levels.iter().rposition(|l| l.len() >= SHARED).unwrap_or(self.levels.len().saturating_sub(1))
     }
 }
 
@@ -78,7 +96,7 @@ struct Marker<'a> {
     slack: f64,
     coverage: Coverage,
     /// By address: a shape may be placed many times.
-    runs: HashMap<*const (), Runs>,
+    runs: HashMap<usize, Runs>,
 }
 
 impl Coverage {
@@ -89,11 +107,11 @@ impl Coverage {
         let projection = scene.camera.projection()?;
         let primitives = scene.report.triangles + scene.report.procedurals;
         let samples = rect.area() as u64 * u64::from(spp);
-        if primitives.saturating_mul(COSTS[0]) > samples.saturating_mul(COSTS[1]) {
+        if spp < LEAST_SPP || primitives.saturating_mul(COSTS[0]) > samples.saturating_mul(COSTS[1]) {
             return None;
         }
         // Boxes over runs of primitives, and a mark a pixel.
-        let runs = size_of::<DAabb>() as u64 * primitives.div_ceil(FAN as u64 - 1);
+        let runs = size_of::<Aabb>() as u64 * primitives.div_ceil(FAN as u64 - 1);
         if !memory::fits(runs + rect.area() as u64) {
             return None;
         }
@@ -155,12 +173,35 @@ impl Marker<'_> {
         if self.is_done(&DAabb::from(shape.bounds()), placement) {
             return;
         }
-        let key = std::ptr::from_ref(shape).cast::<()>();
+        let key = std::ptr::from_ref(shape).cast::<()>().addr();
         let runs = self.runs.remove(&key).unwrap_or_else(|| Runs::new(shape));
-        if let Some(top) = runs.levels.len().checked_sub(1) {
-            (0..runs.levels[top].len()).for_each(|i| self.run(shape, &runs, (top, i), placement));
+        let level = runs.shared();
+        let boxes = runs.levels.get(level).map_or(0, Vec::len);
+        if boxes < SHARED {
+            (0..boxes).for_each(|i| self.run(shape, &runs, (level, i), placement));
+        } else {
+            // Each thread marks pixels of its own. What it does twice, as it does not see the others' marks, it marks alike.
+            let parts =
+                (0..boxes).into_par_iter().with_min_len(boxes.div_ceil(4 * rayon::current_num_threads()));
+            let all = parts.fold(
+                || self.fork(),
+                |mut part, i| {
+                    part.run(shape, &runs, (level, i), placement);
+                    part
+                },
+            );
+            for part in all.map(|part| part.coverage.covered).collect::<Vec<_>>() {
+                self.coverage.covered.iter_mut().zip(part).for_each(|(mine, theirs)| *mine |= theirs);
+            }
         }
         self.runs.insert(key, runs);
+    }
+
+    /// One that knows what is marked so far.
+    fn fork(&self) -> Self {
+        let Coverage { rect, covered } = &self.coverage;
+        let coverage = Coverage { rect: *rect, covered: covered.clone() };
+        Marker { projection: self.projection, coverage, runs: HashMap::new(), ..*self }
     }
 
     /// Box `i` of a level and what is below it.
@@ -171,7 +212,7 @@ impl Marker<'_> {
         (level, i): (usize, usize),
         placement: Option<DAffine3>,
     ) {
-        if self.is_done(&runs.levels[level][i], placement) {
+        if self.is_done(&DAabb::from(runs.levels[level][i]), placement) {
             return;
         }
         let below = |n: usize| i * FAN..((i + 1) * FAN).min(n);

@@ -2,7 +2,7 @@
 
 pub mod adaptive;
 pub mod aov;
-mod backdrop;
+pub mod backdrop;
 pub mod block;
 pub mod coverage;
 pub mod film;
@@ -145,6 +145,7 @@ impl Renderer {
         // A single sample a pixel shows what lies in its middle.
         let skips = s.skip_background && s.spp > 1 && integrator.shows_background();
         let coverage = if skips { Coverage::of(scene, crop, s.filter, s.spp) } else { None };
+        let coverage = coverage.filter(|c| backdrop::pays(scene, s.filter, c, crop, s.spp));
         out.stats.free_pixels = coverage.as_ref().map_or(0, |c| c.free() as u64);
         let job = Job { coverage: coverage.as_ref(), ..Job::new(scene, integrator.as_ref(), s) };
         let workers = Mutex::new(Vec::<Worker>::new());
