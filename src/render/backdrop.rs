@@ -32,8 +32,7 @@ const WORTH: u64 = 12;
 /// threads. Under a photograph of fine grain hardly a pixel is taken.
 pub fn pays(scene: &Scene, filter: PixelFilter, coverage: &Coverage, rect: PixelRect, spp: u32) -> bool {
     let is_free = |(x, y): (u32, u32)| !coverage.is_covered(x, y);
-    let tiles: Vec<PixelRect> =
-        rect.tiles(TILE_SIDE).filter(|tile| tile.pixels().any(|p| is_free(p))).collect();
+    let tiles: Vec<PixelRect> = rect.tiles(TILE_SIDE).filter(|tile| tile.pixels().any(&is_free)).collect();
     let (mut free, mut taken) = (0, 0);
     let mut backdrop = Backdrop::default();
     for tile in tiles.iter().step_by(tiles.len().div_ceil(TRIED).max(1)) {
