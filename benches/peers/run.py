@@ -50,6 +50,8 @@ def draw(a):
     """Pages of all records that there are, skylit's first; a plot for each scene of that."""
     path = lambda name: os.path.join(a.json, name)
     kept = [path(f"{r}.json") for words in PEERS.values() for r, *_ in words if os.path.exists(path(f"{r}.json"))]
+    if not kept:
+        return
     others = [w for record in kept[1:] for w in ("--with", record)]
     with open(path("all.txt"), "w") as out:
         subprocess.run([a.skylit, "bench", "error", kept[0], *others, "--html", path("all.html")], stdout=out)

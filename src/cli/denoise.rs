@@ -1,8 +1,9 @@
 //! `--denoise`: the picture without its noise, beside the picture.
 
+use crate::color::Rgb;
 use crate::error::{Error, Result};
-use crate::image::denoise::{Halves, Outliers, denoise};
-use crate::image::picture::{Picture, SampleKind};
+use crate::image::denoise::{Halves, denoise};
+use crate::image::picture::{Picture, Plane, SampleKind};
 use crate::memory;
 use crate::render::aov::AovRow;
 use crate::render::film::Film;
@@ -52,7 +53,7 @@ pub fn add_layer(film: &Film, picture: &mut Picture) -> Result<DenoiseReport> {
         color: [&halves[0], &halves[1]],
         features: features.iter().map(|f| [f.as_slice(); 2]).collect(),
     };
-    let done = denoise(&input, Outliers::Keep).map_err(|e| Error::Internal(format!("denoising: {e}")))?;
+    let done = denoise(&input).map_err(|e| Error::Internal(format!("denoising: {e}")))?;
     let report = DenoiseReport {
         mean_ratio: done.bias(&input).ratio,
         error_before: relative_error(&done.color, |i, c| {
@@ -69,12 +70,13 @@ pub fn add_layer(film: &Film, picture: &mut Picture) -> Result<DenoiseReport> {
 }
 
 /// Coverage and the layers that were rendered for it, misses marked. Of distance the logarithm: what a plane's colour
-/// depends on changes with it about linearly near and far.
+/// depends on changes with it about linearly near and far. They are taken to have no noise: below a lens or few samples at
+/// outlines they have some, which the layer keeps.
 fn features(picture: &Picture) -> Vec<Vec<f32>> {
     let channels = picture.planes.iter().filter(|p| {
         p.name == "A" || FEATURES.iter().any(|f| p.name.strip_prefix(f).is_some_and(|c| c.starts_with('.')))
     });
-    let plane = |p: &crate::image::picture::Plane| match p.name.as_str() {
+    let plane = |p: &Plane| match p.name.as_str() {
         "depth.Z" => p.data.iter().map(|z| if *z > 0.0 { z.ln() } else { f32::NAN }).collect(),
         _ => p.data.clone(),
     };
@@ -83,10 +85,8 @@ fn features(picture: &Picture) -> Vec<Vec<f32>> {
 
 /// Root of the mean of squared errors, each over the square of `color` and a hundredth of the squared mean luminance.
 fn relative_error(color: &[[f32; 3]], square: impl Fn(usize, usize) -> f64) -> f64 {
-    let luminance =
-        |c: &[f32; 3]| 0.2126 * f64::from(c[0]) + 0.7152 * f64::from(c[1]) + 0.0722 * f64::from(c[2]);
     let n = color.len().max(1) as f64;
-    let mean = color.iter().map(luminance).sum::<f64>() / n;
+    let mean = color.iter().map(|c| f64::from(Rgb::from(*c).luminance())).sum::<f64>() / n;
     let floor = (0.01 * mean * mean).max(f64::MIN_POSITIVE);
     let all = color.iter().enumerate().flat_map(|(i, v)| (0..3).map(move |c| (i, c, f64::from(v[c]))));
     let terms = all.map(|(i, c, v)| square(i, c) / (v * v + floor)).filter(|t| t.is_finite());

@@ -12,7 +12,7 @@ use crate::render::aov::{self, AovRow};
 use crate::render::film_layers::{self, FilmLayer};
 use crate::scene::desc::Background;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Flags of what is written.
 #[derive(Args)]
@@ -97,13 +97,14 @@ impl OutputArgs {
             false => None,
         };
         denoise::drop_unwanted(&mut picture, &plan.written);
-        let shown = self.denoise.then(|| denoise::shown(&picture));
+        let has_layers = |path: &Path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
+        let shows_one = self.denoise && !self.outputs.iter().all(|path| has_layers(path));
+        let shown = shows_one.then(|| denoise::shown(&picture));
         let transfer = self.transfer.map_or(info.transfer, |TransferArg(t)| t);
         let look = Look { transfer, ..plan.look };
         let options = WriteOptions { look, alpha: info.background == Background::Transparent };
         self.outputs.iter().try_for_each(|path| {
-            let has_layers = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
-            let picture = shown.as_ref().filter(|_| !has_layers).unwrap_or(&picture);
+            let picture = shown.as_ref().filter(|_| !has_layers(path)).unwrap_or(&picture);
             write_picture(path, picture, &options)?;
             log::info!("wrote {}", path.display());
             Ok(())

@@ -81,8 +81,8 @@ struct Skipped {
     surface_points: u64,
     /// By cause.
     rays: Avoided,
-    /// Part of all rays that were not traced whose cause is known: of a camera ray a sample, and of a shadow ray and a
-    /// scattered ray a surface point.
+    /// Part of all rays that were not traced whose cause is known: of a camera ray a sample, and of what
+    /// [`Avoided::candidates`] counts.
     explained: Option<f64>,
 }
 
@@ -90,9 +90,8 @@ impl Skipped {
     fn of(stats: &RenderStats) -> Self {
         let a = stats.avoided;
         let traced = |kind: fn(&RayCounts) -> u64| kind(&stats.rays) - kind(&stats.pilot);
-        // The last rays of paths that only ask whether they escape count as shadow rays.
         let from_surfaces = traced(|r| r.scattered + r.shadow);
-        let avoided = (stats.samples - traced(|r| r.camera)) + (2 * a.points).saturating_sub(from_surfaces);
+        let avoided = (stats.samples - traced(|r| r.camera)) + a.candidates.saturating_sub(from_surfaces);
         let known = stats.spared + a.rays();
         Skipped {
             pixels: stats.free_pixels,

@@ -50,17 +50,6 @@ pub struct Halves<'a> {
     pub features: Vec<[&'a [f32]; 2]>,
 }
 
-/// What is done with pixels that are more than ten times brighter in one half than anything nearby in the other.
-/// They take no part in the filtering of others in either case.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Outliers {
-    /// They stay as they are, and so does the sum of light.
-    #[default]
-    Keep,
-    /// What the neighbours say takes their place. The picture loses their light; see [`Denoised::bias`].
-    Replace,
-}
-
 /// Why a picture cannot be denoised.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum DenoiseError {
@@ -101,7 +90,8 @@ pub struct Denoised {
     /// 17 x 17 pixels. Good for means over a picture (in tests 1.2 to 2.1 times too large); a single pixel's may be
     /// far off.
     pub error: Vec<[f32; 3]>,
-    /// Pixels that were outliers (see [`Outliers`]).
+    /// Pixels more than ten times brighter in one half than anything nearby in the other. They stay as they are, and so
+    /// does the sum of light; in the filtering of others they take no part.
     pub outliers: usize,
     /// Pixels of which a half was not finite and that neighbours have filled in.
     pub filled: usize,
@@ -177,7 +167,7 @@ impl Halves<'_> {
 ///
 /// # Errors
 /// If a plane is not of the picture's size, or there are too many features.
-pub fn denoise(input: &Halves, outliers: Outliers) -> Result<Denoised, DenoiseError> {
+pub fn denoise(input: &Halves) -> Result<Denoised, DenoiseError> {
     input.check()?;
     if input.width == 0 || input.height == 0 {
         return Ok(Denoised { color: Vec::new(), error: Vec::new(), outliers: 0, filled: 0 });
@@ -185,5 +175,5 @@ pub fn denoise(input: &Halves, outliers: Outliers) -> Result<Denoised, DenoiseEr
     let prepared = prepare::Prepared::new(input);
     let features = features::prepare(input);
     let predictions = regress::predictions(&prepared, &prepared.guide(), &features);
-    Ok(select::select(input, &prepared, &predictions, outliers))
+    Ok(select::select(input, &prepared, &predictions))
 }

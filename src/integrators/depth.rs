@@ -77,6 +77,11 @@ impl Block<'_> {
         }
     }
 
+    /// Shadow rays that a surface point may have.
+    pub(super) fn shadow_rays(&self) -> u64 {
+        if self.each_light { self.scene.lights.list.len() as u64 } else { 1 }
+    }
+
     /// The density per solid angle with which light samples from `from` find `end` on a light.
     #[inline]
     fn light_pdf(&self, light: u32, end: &PathEnd, from: &Receiver) -> f32 {

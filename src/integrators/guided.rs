@@ -37,11 +37,14 @@ impl PathTracer {
             let how = How { guided, ready, alone: strategy == Strategy::Light };
             block.ask_guided(s, &how, work, paths);
         }
-        match work.shadow.len() == before {
-            true if strategy == Strategy::Bsdf => work.avoided.scattered_alone += 1,
-            true => work.avoided.dark_samples += 1,
-            false => {}
-        }
+        let missing = block.shadow_rays() - (work.shadow.len() - before) as u64;
+        let alone = match strategy {
+            _ if delta => missing,
+            Strategy::Bsdf => missing.min(1),
+            Strategy::Light | Strategy::Both => 0,
+        };
+        work.avoided.scattered_alone += alone;
+        work.avoided.dark_samples += missing - alone;
         // Light samples have counted all that scattered rays would find, and there is nothing else to be found.
         if strategy == Strategy::Light && block.guided_alone {
             work.avoided.lit_alone += 1;

@@ -72,8 +72,10 @@ impl PathTracer {
         let all = surfaces.len();
         surfaces.retain(|s| !s.material.is_black());
         let black = (all - surfaces.len()) as u64;
+        let shadow_rays = block.shadow_rays();
         work.avoided.points += all as u64;
-        work.avoided.dark_samples += black;
+        work.avoided.candidates += all as u64 * (shadow_rays + 1);
+        work.avoided.dark_samples += black * shadow_rays;
         work.avoided.absorbed += black;
         for s in surfaces.iter_mut() {
             s.material.prepare(&s.v, &mut s.prepared);
@@ -103,9 +105,8 @@ impl PathTracer {
             true => surfaces.iter().filter(|s| !s.material.is_delta()).count(),
             false => 0,
         };
-        work.avoided.scattered_alone += (surfaces.len() - asked) as u64;
-        // Of several lights each may have had a ray.
-        work.avoided.dark_samples += (asked as u64).saturating_sub((work.shadow.len() - before) as u64);
+        work.avoided.scattered_alone += (surfaces.len() - asked) as u64 * shadow_rays;
+        work.avoided.dark_samples += asked as u64 * shadow_rays - (work.shadow.len() - before) as u64;
         for s in surfaces.iter() {
             self.extend(block, s, work, paths, |_, _| 0.0);
         }

@@ -33,8 +33,10 @@ const FAN: usize = 8;
 const COSTS: [u64; 2] = [100, 45];
 /// Fewer samples of a pixel cost no more than the lookups that take their place.
 const LEAST_SPP: u32 = 16;
-/// Boxes at least among which threads share the work of a shape.
+/// Boxes at least among which threads share the work of a shape, and in how many parts.
 const SHARED: usize = 32;
+/// See [`SHARED`].
+const PARTS: usize = 8;
 
 /// Marks by pixel.
 pub struct Coverage {
@@ -110,9 +112,9 @@ impl Coverage {
         if spp < LEAST_SPP || primitives.saturating_mul(COSTS[0]) > samples.saturating_mul(COSTS[1]) {
             return None;
         }
-        // Boxes over runs of primitives, and a mark a pixel.
+        // Boxes over runs of primitives, and a mark a pixel for each part.
         let runs = size_of::<Aabb>() as u64 * primitives.div_ceil(FAN as u64 - 1);
-        if !memory::fits(runs + rect.area() as u64) {
+        if !memory::fits(runs + (PARTS as u64 + 1) * rect.area() as u64) {
             return None;
         }
         let reach = f64::from(filter.radius()) + MARGIN;
@@ -180,18 +182,16 @@ impl Marker<'_> {
         if boxes < SHARED {
             (0..boxes).for_each(|i| self.run(shape, &runs, (level, i), placement));
         } else {
-            // Each thread marks pixels of its own. What it does twice, as it does not see the others' marks, it marks alike.
-            let parts =
-                (0..boxes).into_par_iter().with_min_len(boxes.div_ceil(4 * rayon::current_num_threads()));
-            let all = parts.fold(
-                || self.fork(),
-                |mut part, i| {
-                    part.run(shape, &runs, (level, i), placement);
-                    part
-                },
-            );
-            for part in all.map(|part| part.coverage.covered).collect::<Vec<_>>() {
-                self.coverage.covered.iter_mut().zip(part).for_each(|(mine, theirs)| *mine |= theirs);
+            // Parts mark pixels of their own. What they do twice, as they do not see each other's marks, marks nothing new
+            // but by rounding: so they are the same for any number of threads.
+            let part = |part: usize| {
+                let mut marker = self.fork();
+                let of_part = edge(part, boxes)..edge(part + 1, boxes);
+                of_part.for_each(|i| marker.run(shape, &runs, (level, i), placement));
+                marker.coverage.covered
+            };
+            for theirs in (0..PARTS).into_par_iter().map(part).collect::<Vec<_>>() {
+                self.coverage.covered.iter_mut().zip(theirs).for_each(|(mine, theirs)| *mine |= theirs);
             }
         }
         self.runs.insert(key, runs);
@@ -329,6 +329,11 @@ impl Marker<'_> {
             }
         }
     }
+}
+
+/// The first of `n` boxes that belongs to a part.
+fn edge(part: usize, n: usize) -> usize {
+    part * n / PARTS
 }
 
 /// The pixels of a range whose samples, reaching so far from their middles, meet an interval; None if there are none.

@@ -20,7 +20,7 @@ pub const TILE_SIDE: u32 = 16;
 /// Most independent replicates of a pixel's point set; those of number `r` go to half-buffer `r % 2`. A film that shall know
 /// its error needs two halves, and more would cost too much: the error of smooth light falls faster than 1/sqrt(n) only
 /// within a replicate. Measured against one replicate (benches/README.md), two have 1.14 to 1.30 times its mean square error
-/// (1.15 to 1.4 at low counts where lights are soft), four had 1.29 to 1.60.
+/// (1.16 to 1.95 where all light is soft), four had 1.29 to 1.60.
 pub const REPLICATES: usize = 2;
 
 /// Bytes of memory for a pixel: sums, and the layers of a picture that is written (four floats, and four halves).

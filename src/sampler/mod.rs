@@ -60,7 +60,7 @@ impl Sampler {
             (Sampler::ZSobol, None) => Sampler::OwenSobol,
             (kind, _) => kind,
         };
-        PointSet { kind, seed, bits: count.map_or(0, |n| n.max(1).next_power_of_two().trailing_zeros()) }
+        PointSet { kind, seed, bits: count.map_or(0, |n| u32::BITS - (n.max(1) - 1).leading_zeros()) }
     }
 }
 

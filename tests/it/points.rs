@@ -107,7 +107,7 @@ fn neighbours_errors_cancel_and_no_pixel_pays_for_it() {
 }
 
 #[test]
-fn no_count_is_worse_than_independent_samples_and_moments_cost_little() {
+fn no_count_is_worse_than_independent_samples_with_moments_or_without() {
     let bench = Bench::new();
     let mut best = f64::INFINITY;
     for spp in [2, 3, 4, 5, 6, 7, 9, 12, 15, 17, 24, 33, 63] {

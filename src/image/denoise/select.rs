@@ -3,7 +3,7 @@
 use super::plane::Size;
 use super::prepare::{Prepared, State};
 use super::regress::Predictions;
-use super::{Denoised, Halves, Outliers};
+use super::{Denoised, Halves};
 
 /// The input as it is, then fits with `k` = 0.5 and with `k` = 1.
 const CANDIDATES: usize = 3;
@@ -47,12 +47,7 @@ struct Selection<'a> {
 }
 
 /// The denoised picture.
-pub(super) fn select(
-    input: &Halves,
-    prepared: &Prepared,
-    predictions: &Predictions,
-    outliers: Outliers,
-) -> Denoised {
+pub(super) fn select(input: &Halves, prepared: &Prepared, predictions: &Predictions) -> Denoised {
     let selection = Selection { prepared, predictions };
     let size = prepared.size;
     let shares = blend(size, &selection.best(), &prepared.sound);
@@ -67,7 +62,7 @@ pub(super) fn select(
         out.outliers += usize::from(state == State::Outlier);
         let keeps = match state {
             State::Sound => shares[i][0] == 1.0,
-            State::Outlier => outliers == Outliers::Keep,
+            State::Outlier => true,
             State::Broken => false,
         };
         let (color, error) = match (blended[i], plain) {

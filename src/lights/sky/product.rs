@@ -230,7 +230,7 @@ impl ProductTable {
             return None;
         }
         let y = ((y - before) / of_row).clamp(0.0, ONE_MINUS);
-        let mut x = u[0] * of_row;
+        let x = u[0] * of_row;
         let (mut column, mut sum, mut left) = (0, 0.0, x);
         for (i, w) in (1..).zip(&weights[..self.stride - 1]) {
             sum += f64::from(*w);
@@ -238,12 +238,11 @@ impl ProductTable {
             column = if beyond { i } else { column };
             left = if beyond { x - sum } else { left };
         }
-        x = left;
         let weight = f64::from(weights[column]);
         if weight <= 0.0 {
             return None;
         }
-        let u = [(x / weight).clamp(0.0, ONE_MINUS), y];
+        let u = [(left / weight).clamp(0.0, ONE_MINUS), y];
         let cell = row * self.stride + column;
         let Some(part) = self.parts.get(cell) else {
             return Some(Choice::Disc { disc: cell - self.parts.len(), u });

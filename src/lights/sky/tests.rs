@@ -320,6 +320,24 @@ fn closed_forms_with_discs() {
     assert!(light.at_infinity() && light.power(&Extent { center: Vec3::ZERO, radius: 2.0 }) > 0.0);
 }
 
+/// A sun of 0.02 in radius, 3 texels across: cells eight times as large would hit it by a fiftieth of their samples.
+#[test]
+fn a_sun_in_a_picture_has_cells_of_its_size() {
+    let (w, h) = (512, 256);
+    let at = |i: usize| {
+        let (u, v) = (((i % w) as f64 + 0.5) / w as f64, ((i / w) as f64 + 0.5) / h as f64);
+        let (phi, theta) = ((u - 0.5) * TAU, (0.5 - v) * 0.5 * TAU);
+        [theta.cos() * phi.cos(), theta.sin(), theta.cos() * phi.sin()]
+    };
+    let sun = at(64 * w + 170);
+    let is_sun = |i: usize| at(i).iter().zip(&sun).map(|(a, b)| (a - b).powi(2)).sum::<f64>() < 0.0004;
+    let sky = sky("sphere", picture(w, h, |i| if is_sun(i) { 800.0 } else { 1.0 }));
+    match light(&sky, SkySampling::Compensated, 0.0).map {
+        MapSampler::Table { grid, .. } => assert!(grid.width >= 256, "{} x {}", grid.width, grid.height),
+        _ => panic!("no table"),
+    }
+}
+
 #[test]
 fn methods_have_names_and_options_their_ranges() {
     for (name, sampling) in SkySampling::NAMES {

@@ -76,24 +76,37 @@ fn pixels_of_sky_alone_are_skipped_and_counted() {
     f.refuses("render scene.toml -o a.png --sky-pixels trace", 2, &["--sky-pixels", "integrate"]);
 }
 
-/// All of a camera ray a sample, and a shadow and a scattered ray a surface point, were traced or are told.
+/// All of a camera ray a sample, and from a surface point of a scattered ray and a shadow ray to each light that is to be
+/// sampled, were traced or are told.
 #[test]
 fn every_ray_that_was_not_traced_has_its_cause() {
     let f = Folder::new();
     let text = std::fs::read_to_string(f.path().join("scene.toml")).unwrap();
-    for sky in ["gradient", "midday", "constant"] {
-        // Enough samples that integrals of bare sky pay.
-        let text = text.replace("spp = 2", "spp = 64");
-        f.write("lit.toml", text.replace("\"constant\"", &format!("\"{sky}\"")));
-        for flags in
-            ["--integrator direct", "--integrator path", "--sky-sampling product", "--sky-pixels sample"]
-        {
-            f.run(&format!("render lit.toml --size 64x48 --spp 64 -o a.exr --stats s.json {flags}"))
-                .succeeds();
+    // Enough samples that integrals of bare sky pay.
+    let text = text.replace("spp = 2", "spp = 64");
+    let lamps = "[[lights]]\ntype = \"point\"\nposition = [0, 1, 2]\nintensity = 3\n[materials.mirror]\ntype = \
+                 \"mirror\"\n[[objects]]\nshape = { type = \"sphere\", center = [1, 1, 0], radius = 0.4 }\nmaterial = \
+                 \"mirror\"\n";
+    let each = |kind: &str| format!("integrator = \"{kind}\"\neach_light = true");
+    for (sky, more, by) in [
+        ("gradient", "", String::new()),
+        ("midday", "", String::new()),
+        ("constant", "", String::new()),
+        ("midday", lamps, String::new()),
+        ("midday", lamps, each("path")),
+        ("gradient", lamps, each("direct")),
+    ] {
+        let lit = text.replace("\"constant\"", &format!("\"{sky}\"")) + more;
+        f.write("lit.toml", lit.replace("spp = 64", &format!("spp = 64\n{by}")));
+        for flags in ["", "--integrator direct", "--sky-sampling product", "--sky-pixels sample"] {
+            if flags.contains("integrator") && !by.is_empty() {
+                continue;
+            }
+            f.run(&format!("render lit.toml --size 64x48 -o a.exr --stats s.json {flags}")).succeeds();
             let s = f.json("s.json");
-            assert!(s["skipped"]["surface_points"].as_u64().unwrap() > 0, "{sky} {flags}");
+            assert!(s["skipped"]["surface_points"].as_u64().unwrap() > 0, "{sky} {by} {flags}");
             let explained = s["skipped"]["explained"].as_f64().unwrap();
-            assert!((explained - 1.0).abs() < 1e-12, "{sky} {flags}: {}", s["skipped"]);
+            assert!((explained - 1.0).abs() < 1e-12, "{sky} {by} {flags}: {}", s["skipped"]);
         }
         let info = f.run("info lit.toml --size 64x48 --json i.json").succeeds();
         assert!(info.stdout.contains("which no geometry projects into"), "{}", info.stdout);
