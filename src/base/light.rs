@@ -54,23 +54,19 @@ pub struct Lobes {
     pub wo: Vec3,
     /// About the receiver's shading normal.
     pub scattering: Scattering,
+    /// Whether no scattered ray competes, so that all that is scattered has to be found.
+    pub alone: bool,
 }
 
-/// What a guided light has worked out for one receiver; room that is kept from one to the next.
-#[derive(Debug, Clone, Default)]
+/// What a guided light has worked out for one receiver: which of its tables it will ask, by numbers of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Guide {
-    /// Of the light's parts.
-    pub weights: Vec<f32>,
-    /// Running sums over rows of them.
-    pub sums: Vec<f64>,
-}
-
-impl Guide {
-    /// Sum of all weights.
-    #[inline(always)]
-    pub fn total(&self) -> f64 {
-        self.sums.last().copied().unwrap_or(0.0)
-    }
+    /// Numbers of the tables.
+    pub tables: [u32; 2],
+    /// How often each is asked; together 1.
+    pub shares: [f32; 2],
+    /// How often a sample is taken at all: less than 1 where it would hardly be worth its ray.
+    pub worth: f32,
 }
 
 /// A light at infinity that chooses directions by what it brings times what the surface makes of it. For each receiver

@@ -67,6 +67,11 @@ pub trait Skybox: Send + Sync {
     /// Solid angle per unit of u and v at a chart's point, steradians.
     fn solid_angle_density(&self, c: ChartPoint) -> f64;
 
+    /// [`Skybox::direction`] and [`Skybox::solid_angle_density`] of a point, which share most of their arithmetic.
+    fn direction_and_density(&self, c: ChartPoint) -> (DVec3, f64) {
+        (self.direction(c), self.solid_angle_density(c))
+    }
+
     /// The integral of luminance over each cell of a `grid` at most as fine as the natural one, in double,
     /// row by row (the row of v = 0 first), chart by chart. Not zero wherever the radiance is not. By quadrature
     /// unless a sky knows better.

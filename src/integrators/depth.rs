@@ -11,6 +11,9 @@ use crate::sampling::mis::power;
 use crate::scene::Scene;
 use glam::Vec3;
 
+/// Shadow rays that are traced together, at least, if there are as many.
+const MANY_SHADOWS: usize = 1024;
+
 /// What is the same for all paths of a depth.
 pub(super) struct Block<'a> {
     pub scene: &'a Scene,
@@ -23,12 +26,25 @@ pub(super) struct Block<'a> {
     /// The light at infinity that takes surfaces into account.
     pub guided: Option<(u32, &'a dyn GuidedLight)>,
     pub strategies: &'a Strategies,
+    /// Whether surfaces may take several samples of the only light.
+    pub splits: bool,
+    /// Whether rays that are scattered at this depth end where they land.
+    pub ends: bool,
     /// Whether rays that are scattered at this depth can meet no other light than the guided one.
     pub guided_alone: bool,
 }
 
 impl Block<'_> {
-    /// Traces the shadow rays of this depth and adds what arrives.
+    /// As [`Block::resolve_shadows`], if there are so many rays that more would not stay in the caches. (Between surfaces:
+    /// what one of them adds to its path must not depend on others.)
+    #[inline]
+    pub(super) fn resolve_many(&self, work: &mut Workspace, paths: &mut PathScratch, out: &mut PathResults) {
+        if work.shadow.len() >= MANY_SHADOWS {
+            self.resolve_shadows(work, paths, out);
+        }
+    }
+
+    /// Traces the shadow rays that wait and adds what arrives.
     pub(super) fn resolve_shadows(
         &self,
         work: &mut Workspace,
@@ -48,6 +64,8 @@ impl Block<'_> {
             escapes,
             &mut out.li,
         );
+        work.shadow.clear();
+        pending.clear();
     }
 
     /// The last rays of paths in a scene where only what lies at infinity shines: any hit ends them in the dark.

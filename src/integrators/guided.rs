@@ -2,13 +2,15 @@
 
 use super::Workspace;
 use super::depth::Block;
-use super::light_dim;
 use super::path::{PathScratch, PathTracer};
-use super::strategy::Strategy;
+use super::points::VertexPoint;
+use super::strategy::{MOST_SPLIT, Strategy};
 use super::surface::Surface;
-use crate::base::light::{ChosenLight, GuidedLight, Lobes};
+use super::{PathId, light_dim};
+use crate::base::light::{ChosenLight, Guide, GuidedLight, Lobes};
 use crate::base::material::Scattering;
 use crate::sampler::{Dim, Slot};
+use glam::Vec3;
 
 /// A guided light and its index.
 type Guided<'a> = (u32, &'a dyn GuidedLight);
@@ -27,45 +29,79 @@ impl PathTracer {
         let delta = s.material.is_delta();
         let strategy = if delta { Strategy::Bsdf } else { block.strategies.of(&s.v) };
         let (index, light) = guided;
+        let mut guide = Guide::default();
         let ready = strategy != Strategy::Bsdf && {
             let scattering = s.material.scattering(&s.prepared).unwrap_or(Scattering::EVEN);
-            let lobes = Lobes { wo: s.v.wo, scattering };
-            light.prepare(&s.receiver, &lobes, &mut paths.guide)
+            let lobes = Lobes { wo: s.v.wo, scattering, alone: strategy.is_light() };
+            light.prepare(&s.receiver, &lobes, &mut guide)
         };
+        let split = match strategy {
+            Strategy::Light(n) if block.splits => u32::from(n),
+            Strategy::Both(n) if block.splits && block.ends => u32::from(n),
+            _ => 1,
+        };
+        let scattered = if strategy.is_light() { 0 } else { split };
         let before = work.shadow.len();
         if !delta {
-            let how = How { guided, ready, alone: strategy == Strategy::Light };
-            block.ask_guided(s, &how, work, paths);
+            let how = How { guided, guide, ready, scattered: scattered as f32 };
+            match split {
+                1 => block.ask_guided(s, &how, work, paths),
+                _ => block.ask_again(s, &how, split, work, paths),
+            }
         }
-        let missing = block.shadow_rays() - (work.shadow.len() - before) as u64;
+        let more = u64::from(split) - 1;
+        work.avoided.candidates += more + u64::from(scattered.max(1)) - 1;
+        let missing = block.shadow_rays() + more - (work.shadow.len() - before) as u64;
         let alone = match strategy {
             _ if delta => missing,
             Strategy::Bsdf => missing.min(1),
-            Strategy::Light | Strategy::Both => 0,
+            Strategy::Light(_) | Strategy::Both(_) => 0,
         };
         work.avoided.scattered_alone += alone;
         work.avoided.dark_samples += missing - alone;
         // Light samples have counted all that scattered rays would find, and there is nothing else to be found.
-        if strategy == Strategy::Light && block.guided_alone {
+        if strategy.is_light() && block.guided_alone {
             work.avoided.lit_alone += 1;
             return;
         }
         let pmf = block.guided_pmf(index, s);
-        self.extend(block, s, work, paths, |guide, wi| match strategy {
-            Strategy::Light => f32::INFINITY,
-            Strategy::Both if ready => pmf * light.pdf(&s.receiver, guide, wi),
-            Strategy::Both | Strategy::Bsdf => 0.0,
-        });
+        let guided_pdf = |wi: Vec3| match strategy {
+            Strategy::Light(_) => f32::INFINITY,
+            Strategy::Both(_) if ready => pmf * light.pdf(&s.receiver, &guide, wi),
+            Strategy::Both(_) | Strategy::Bsdf => 0.0,
+        };
+        if scattered <= 1 {
+            let point = paths.points.get(s.number);
+            return self.extend(block, s, &point, work, paths, guided_pdf);
+        }
+        let id = paths.points.get(s.number).id;
+        let id = PathId { sampler: id.sampler.times(split), index: id.index.wrapping_mul(split), ..id };
+        let points = draw(&id, Dim::at(block.depth, Slot::BsdfUv));
+        for (k, &bsdf) in (0..).zip(&points[..split as usize]) {
+            let id = PathId { index: id.index.wrapping_add(k), ..id };
+            let point = VertexPoint { id, light: [0.0; 2], bsdf, share: 1.0 / split as f32 };
+            self.extend(block, s, &point, work, paths, guided_pdf);
+        }
     }
+}
+
+/// The points of some samples from one on, as many as any surface takes.
+#[inline]
+fn draw(first: &PathId, dim: Dim) -> [[f32; 2]; MOST_SPLIT as usize] {
+    let [mut x, mut y] = [[0.0; MOST_SPLIT as usize]; 2];
+    first.sampler.fill_2d(first.index, dim, &mut x, &mut y);
+    std::array::from_fn(|k| [x[k], y[k]])
 }
 
 /// How the guided light is sampled from a surface.
 struct How<'a> {
     guided: Guided<'a>,
+    /// What it has worked out for the surface.
+    guide: Guide,
     /// Whether it can be sampled at all.
     ready: bool,
-    /// Whether no scattered ray competes.
-    alone: bool,
+    /// How many scattered rays compete.
+    scattered: f32,
 }
 
 impl Block<'_> {
@@ -105,6 +141,20 @@ impl Block<'_> {
         self.ask_one(s, how, chosen, point.light, work, paths);
     }
 
+    /// Several shadow rays to the only light there is; each sample has the weight of a light that is chosen as many times
+    /// as often. Their points follow one another in a sequence of as many more: together they are as even as if so many
+    /// paths had drawn one.
+    #[inline]
+    fn ask_again(&self, s: &Surface, how: &How, n: u32, work: &mut Workspace, paths: &mut PathScratch) {
+        let id = paths.points.get(s.number).id;
+        let id = PathId { sampler: id.sampler.times(n), index: id.index.wrapping_mul(n), ..id };
+        let points = draw(&id, Dim::at(self.depth, Slot::LightUv));
+        let chosen = ChosenLight { light: how.guided.0, pmf: n as f32 };
+        for u in &points[..n as usize] {
+            self.ask_one(s, how, chosen, *u, work, paths);
+        }
+    }
+
     #[inline]
     fn ask_one(
         &self,
@@ -118,12 +168,13 @@ impl Block<'_> {
         let (index, light) = how.guided;
         let is_guided = chosen.light == index;
         let sample = match is_guided {
-            true if how.ready => light.sample(&s.receiver, &paths.guide, u),
+            true if how.ready => light.sample(&s.receiver, &how.guide, u),
             true => None,
             false => self.scene.lights.list[chosen.light as usize].sample_li(&s.receiver, u),
         };
         if let Some(l) = sample {
-            self.connect(s, chosen, &l, how.alone && is_guided, work, paths);
+            let scattered = if is_guided { how.scattered } else { how.scattered.max(1.0) };
+            self.connect(s, chosen, &l, scattered, work, paths);
         }
     }
 }

@@ -11,7 +11,7 @@ use super::{
     CameraBatch, FirstHit, Integrator, PathIds, PathResults, PilotPlan, Specialised, Workspace, pilot,
 };
 use crate::base::hit::{HitBatch, NO_PRIMITIVE};
-use crate::base::light::{Guide, Receiver};
+use crate::base::light::Receiver;
 use crate::base::material::Prepared;
 use crate::base::ray::{Coherence, RayBatch};
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
@@ -54,7 +54,8 @@ pub const ROW: Row<dyn Integrator> = Row {
         let off = |name| Params::new().with(name, Value::Bool(false));
         let each = Params::new().with("each_light", Value::Bool(true));
         let by = |name: &str| Params::new().with("strategy", Value::Text(name.into()));
-        vec![Params::new(), off("light_sampling"), off("mis"), each, by("both"), by("light"), by("bsdf")]
+        let by = ["both", "both-2", "light", "light-4", "bsdf"].map(by);
+        [Params::new(), off("light_sampling"), off("mis"), each].into_iter().chain(by).collect()
     },
 };
 
@@ -77,9 +78,12 @@ pub(super) const EACH_LIGHT: ParamSpec = ParamSpec {
 /// Shared with `direct`.
 pub(super) const STRATEGY: ParamSpec = ParamSpec {
     name: "strategy",
-    kind: ParamKind::Choice(&["auto", "both", "light", "bsdf"]),
+    kind: ParamKind::Choice(&[
+        "auto", "both", "both-2", "both-4", "both-8", "light", "light-2", "light-4", "light-8", "bsdf",
+    ]),
     default: Some("auto"),
-    doc: "how a sky that is sampled by products is found: by light samples, scattered rays or both; auto tries them out",
+    doc: "how a sky that is sampled by products is found: by light samples, scattered rays or both, at the first \
+          surface so many of each; auto tries them out",
 };
 
 /// Most lights that are sampled each: a shadow ray for every one of them waits at every surface.
@@ -147,7 +151,6 @@ pub struct PathScratch {
     /// Which rays of the depth met something.
     hits: Vec<u32>,
     pub(super) points: VertexPoints,
-    pub(super) guide: Guide,
 }
 
 impl Integrator for PathTracer {
@@ -216,6 +219,8 @@ impl PathTracer {
             each_light: self.each_light && lights.list.len() <= MOST_EACH,
             guided,
             strategies: &self.strategies,
+            splits: depth == 1 && lights.list.len() == 1,
+            ends: depth == self.max_depth,
             guided_alone: depth >= self.max_depth
                 && !scene.features.emitting_surfaces
                 && lights.at_infinity.len() == 1,
@@ -241,6 +246,7 @@ impl PathTracer {
             return paths.escapes.fill_background(scene, rays.directions(), &mut out.li);
         }
         paths.sort_out(&work.hits, rays);
+        paths.escapes.add_background(scene, &mut out.li);
         paths.draw(&block, self.light_sampling, |_, i| i);
         let mut surfaces = Vec::with_capacity(Surface::AT_ONCE);
         for first in (0..paths.hits.len()).step_by(Surface::AT_ONCE) {
@@ -268,8 +274,8 @@ impl PathTracer {
                 block.add_emission(&s.state, &s.v, -s.v.wo, out);
             }
             self.scatter(&block, &mut surfaces, work, paths);
+            block.resolve_many(work, paths, out);
         }
-        paths.escapes.add_background(scene, &mut out.li);
         block.resolve_shadows(work, paths, out);
     }
 
@@ -286,6 +292,7 @@ impl PathTracer {
         block.scene.kernel.intersect_batch(rays, &mut work.hits, Coherence::Incoherent);
         paths.begin(&mut work.next, &mut work.shadow);
         paths.sort_out(&work.hits, rays);
+        block.add_escapes(paths, out);
         let goes_on = block.depth <= self.max_depth;
         if goes_on {
             paths.draw(block, self.light_sampling, |states, i| states[i as usize].index);
@@ -304,9 +311,9 @@ impl PathTracer {
             }
             if goes_on {
                 self.scatter(block, &mut surfaces, work, paths);
+                block.resolve_many(work, paths, out);
             }
         }
-        block.add_escapes(paths, out);
         block.resolve_shadows(work, paths, out);
     }
 }

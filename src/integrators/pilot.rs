@@ -3,8 +3,8 @@
 //! Pixels of a coarse lattice are rendered with each strategy, by the integrator itself and with the points that the
 //! render will use, in two independent halves; their spread is the variance that the render would have, stratification,
 //! visibility and all. Rays are counted, not timed, so that the choice is a function of scene and seed. A material's
-//! strategy is the one with the least variance times cost. Materials that few of the pixels show keep to what is good in
-//! most scenes: light samples alone where they are known to scatter evenly, both otherwise.
+//! strategy is the one that takes the least time to the same error. Materials that few of the pixels show keep to what is
+//! good in most scenes: light samples alone where they are known to scatter evenly, else scattered rays as well.
 
 use super::path::PathTracer;
 use super::strategy::{Strategies, Strategy};
@@ -15,19 +15,21 @@ use crate::base::material::{Material, Prepared};
 use crate::base::ray::{Coherence, RayBatch};
 use crate::base::vertex::Vertex;
 use crate::color::Rgb;
-use crate::sampler::ray_key;
+use crate::sampler::{Dim, ray_key};
 use crate::scene::Scene;
 use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Samples of a pixel and half.
 const SAMPLES: u32 = 8;
+/// Strategies that are tried, at most, or nearly so.
+const CANDIDATES: usize = 4;
 /// Most pixels of a material that are tried.
 const MOST: usize = 384;
 /// Fewer say nothing.
 const LEAST: usize = 24;
 /// Most part of a render's samples that is spent on trying.
-const SHARE: f64 = 0.03;
+const SHARE: f64 = 0.02;
 /// Most camera rays that look for materials.
 const SCOUTS: usize = 8192;
 /// Seeds of pilots lie apart from those of renders.
@@ -35,8 +37,11 @@ const SEED: u64 = 0x7069_6c6f_7400_0000;
 /// Part of the squared mean that is added to a pixel's own, as in relMSE: what a dark pixel counts for.
 const EPSILON: f64 = 0.01;
 
+/// How steeply squared errors fall with the number of samples: the exponent at which cost counts against variance.
+const SLOPE: f64 = 1.2;
+
 /// What is spent on a sample beside its rays, in rays of a shadow's cost.
-const SAMPLE_COST: f64 = 1.0;
+const SAMPLE_COST: f64 = 2.0;
 /// The same of a coherent camera ray, a scattered ray with the surface that it may meet, and a shadow ray with its light
 /// sample.
 const RAY_COSTS: [f64; 3] = [0.5, 1.6, 1.6];
@@ -46,14 +51,21 @@ const RAY_COSTS: [f64; 3] = [0.5, 1.6, 1.6];
 /// some percent of the mean.
 const TAME: f32 = 16.0;
 
-/// What is tried for a material. Scattered rays alone miss what is small and bright. So do light samples on narrow lobes:
+/// What is best in most scenes for surfaces that scatter evenly, and for others: several samples for each camera ray, whose
+/// surface point costs as much as two of them.
+const EVEN: Strategy = Strategy::Light(8);
+const FACETS: Strategy = Strategy::Both(4);
+/// How much better than the first candidate another has to look: so much is noise.
+const MARGIN: f64 = 0.85;
+
+/// What is tried for a material, the most likely first. Scattered rays alone miss what is small and bright. So do light samples on narrow lobes:
 /// within a coarse cell with a sun, the rest of the cell is hardly ever drawn, and a lobe may lie just there.
 fn candidates(is_even: bool, contrast: f32) -> &'static [Strategy] {
     match (contrast <= TAME, is_even) {
-        (true, true) => &[Strategy::Both, Strategy::Light, Strategy::Bsdf],
-        (false, true) => &[Strategy::Both, Strategy::Light],
-        (true, false) => &[Strategy::Both, Strategy::Bsdf],
-        (false, false) => &[Strategy::Both],
+        (true, true) => &[EVEN, Strategy::Light(2), Strategy::Both(1), Strategy::Bsdf],
+        (false, true) => &[EVEN, Strategy::Light(2), Strategy::Both(1)],
+        (true, false) => &[FACETS, Strategy::Both(1), Strategy::Bsdf],
+        (false, false) => &[FACETS, Strategy::Both(1)],
     }
 }
 
@@ -82,7 +94,7 @@ impl<'a> Classes<'a> {
             let slots = object.materials.iter().map(|material| {
                 *by_address.entry(Arc::as_ptr(material).cast::<()>()).or_insert_with(|| {
                     let class =
-                        Class { material, is_even: false, pixels: Vec::new(), strategy: Strategy::Both };
+                        Class { material, is_even: false, pixels: Vec::new(), strategy: Strategy::Both(1) };
                     all.list.push(class);
                     all.list.len() - 1
                 })
@@ -107,7 +119,7 @@ pub(super) fn choose(tracer: &PathTracer, scene: &Scene, plan: &PilotPlan) -> Op
     let mut classes = Classes::new(scene);
     let mut rays = RayCounts::default();
     let samples = plan.pixels.area() as f64 * f64::from(plan.spp);
-    let of_class = SAMPLES as usize * 2 * Strategy::NAMES.len();
+    let of_class = SAMPLES as usize * 2 * CANDIDATES;
     let affordable = (SHARE * samples / of_class as f64) as usize;
     let scouts = ((SHARE * samples) as usize).min(SCOUTS);
     if affordable >= LEAST {
@@ -116,7 +128,7 @@ pub(super) fn choose(tracer: &PathTracer, scene: &Scene, plan: &PilotPlan) -> Op
     let most = (affordable / classes.list.len().max(1)).min(MOST);
     for class in classes.list.iter_mut().filter(|c| !c.material.is_delta() && !c.material.is_black()) {
         if class.pixels.len().min(most) < LEAST {
-            class.strategy = if class.is_even { Strategy::Light } else { Strategy::Both };
+            class.strategy = if class.is_even { EVEN } else { FACETS };
             continue;
         }
         let candidates = candidates(class.is_even, contrast);
@@ -127,8 +139,8 @@ pub(super) fn choose(tracer: &PathTracer, scene: &Scene, plan: &PilotPlan) -> Op
         thin(&mut class.pixels, most);
         let run = |s: &Strategy| Trial::run(tracer, scene, plan, &class.pixels, *s);
         let trials: Vec<Trial> = candidates.iter().map(run).collect();
-        trials.iter().for_each(|t| rays.add(&t.rays));
         class.strategy = best(&trials);
+        trials.iter().for_each(|t| rays.add(&t.rays));
     }
     let list = &classes.list;
     let strategies = Strategies::by_object(
@@ -212,8 +224,8 @@ impl Trial {
     }
 }
 
-/// The means of both halves of some pixels. The camera's rays go through the middles: antialiasing would only add to the
-/// variance of all strategies alike.
+/// The means of both halves of some pixels. The camera's rays are spread over the pixel: what its surfaces differ by is
+/// noise that no more samples of light take away, so that the dearer strategies must not be credited with it.
 fn trace(
     tracer: &PathTracer,
     scene: &Scene,
@@ -228,8 +240,11 @@ fn trace(
             let sampler = points.pixel(px, py, half);
             let key = ray_key(px, py, half);
             batch.ids.extend(PathId { sampler, index: 0, key }, SAMPLES as usize);
-            x.resize(x.len() + SAMPLES as usize, px as f32 + 0.5);
-            y.resize(y.len() + SAMPLES as usize, py as f32 + 0.5);
+            for i in 0..SAMPLES {
+                let [u, v] = sampler.get_2d(i, Dim::FILTER);
+                x.push(px as f32 + u);
+                y.push(py as f32 + v);
+            }
         }
     }
     let middle = vec![0.5; if scene.camera.has_lens() { x.len() } else { 0 }];
@@ -262,10 +277,11 @@ fn best(trials: &[Trial]) -> Strategy {
             let scale = f64::from(m.luminance()).powi(2) + EPSILON * mean * mean;
             if d == 0.0 { 0.0 } else { d * d / scale }
         });
-        squares.sum::<f64>() * t.cost()
+        squares.sum::<f64>() * t.cost().powf(SLOPE)
     };
-    let found = trials.iter().min_by(|a, b| score(a).total_cmp(&score(b)));
-    found.map_or(Strategy::Both, |t| t.strategy)
+    let scores = (0..).zip(trials).map(|(i, t)| (score(t) * if i == 0 { MARGIN } else { 1.0 }, t));
+    let found = scores.min_by(|a, b| a.0.total_cmp(&b.0)).map(|s| s.1);
+    found.map_or(Strategy::Both(1), |t| t.strategy)
 }
 
 /// "light for 3 materials (clay, ...), both for 1".

@@ -21,6 +21,8 @@ pub struct VertexPoint {
     pub light: [f32; 2],
     /// See [`Slot::BsdfUv`].
     pub bsdf: [f32; 2],
+    /// What part of the path goes on with it: less than 1 if it goes on in several directions.
+    pub share: f32,
 }
 
 impl VertexPoints {
@@ -43,7 +45,7 @@ impl VertexPoints {
     #[inline]
     pub fn get(&self, k: usize) -> VertexPoint {
         let at = |c: &[Vec<f32>; 2]| [0, 1].map(|a| c[a].get(k).copied().unwrap_or(0.0));
-        VertexPoint { id: self.ids.get(k), light: at(&self.light), bsdf: at(&self.bsdf) }
+        VertexPoint { id: self.ids.get(k), light: at(&self.light), bsdf: at(&self.bsdf), share: 1.0 }
     }
 }
 

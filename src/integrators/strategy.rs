@@ -2,23 +2,47 @@
 
 use crate::base::vertex::Vertex;
 
+/// Most light samples of a surface point.
+pub const MOST_SPLIT: u8 = 8;
+
 /// Which ways of sampling a guided light (see [`crate::base::light::GuidedLight`]) are tried at a surface point. Each by
 /// itself is unbiased.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Strategy {
-    /// Both, joined by multiple importance sampling.
-    #[default]
-    Both,
+    /// Both, joined by multiple importance sampling. So many of each where a path ends at its first surface, from 1 to
+    /// [`MOST_SPLIT`]; else one.
+    Both(u8),
     /// The light alone: scattered rays that meet it count nothing, and are not traced where they can meet nothing else.
-    Light,
+    /// So many samples of it at the first surface that a path meets, from 1 to [`MOST_SPLIT`]; one at the others.
+    Light(u8),
     /// The material alone: no shadow ray.
     Bsdf,
 }
 
+impl Default for Strategy {
+    fn default() -> Self {
+        Strategy::Both(1)
+    }
+}
+
 impl Strategy {
     /// All of them with their names.
-    pub const NAMES: [(&'static str, Strategy); 3] =
-        [("both", Strategy::Both), ("light", Strategy::Light), ("bsdf", Strategy::Bsdf)];
+    pub const NAMES: [(&'static str, Strategy); 9] = [
+        ("both", Strategy::Both(1)),
+        ("both-2", Strategy::Both(2)),
+        ("both-4", Strategy::Both(4)),
+        ("both-8", Strategy::Both(8)),
+        ("light", Strategy::Light(1)),
+        ("light-2", Strategy::Light(2)),
+        ("light-4", Strategy::Light(4)),
+        ("light-8", Strategy::Light(8)),
+        ("bsdf", Strategy::Bsdf),
+    ];
+
+    /// Whether light samples alone count.
+    pub fn is_light(self) -> bool {
+        matches!(self, Strategy::Light(_))
+    }
 
     /// Its name.
     pub fn name(self) -> &'static str {

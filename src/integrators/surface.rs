@@ -9,7 +9,7 @@ use super::path::{PathScratch, PathState, PathTracer};
 use super::pending::Pending;
 use super::points::VertexPoint;
 use super::{PathId, light_dim};
-use crate::base::light::{ChosenLight, Guide, LightSample, Receiver};
+use crate::base::light::{ChosenLight, LightSample, Receiver};
 use crate::base::material::{Material, Prepared, Transmission};
 use crate::base::vertex::Vertex;
 use crate::color::Rgb;
@@ -97,7 +97,7 @@ impl PathTracer {
             }
             for s in surfaces.iter() {
                 if let Some((chosen, l)) = &s.lit {
-                    block.connect(s, *chosen, l, false, work, paths);
+                    block.connect(s, *chosen, l, 1.0, work, paths);
                 }
             }
         }
@@ -108,22 +108,23 @@ impl PathTracer {
         work.avoided.scattered_alone += (surfaces.len() - asked) as u64 * shadow_rays;
         work.avoided.dark_samples += asked as u64 * shadow_rays - (work.shadow.len() - before) as u64;
         for s in surfaces.iter() {
-            self.extend(block, s, work, paths, |_, _| 0.0);
+            let point = paths.points.get(s.number);
+            self.extend(block, s, &point, work, paths, |_| 0.0);
         }
     }
 
-    /// The direction in which a path goes on, if it does. `guided_pdf` tells the density with which light samples find a
-    /// direction on the guided light.
+    /// The direction in which a path goes on, if it does, by the numbers of `point`. `guided_pdf` tells the density with which light samples find a direction on the guided light.
     #[inline]
     pub(super) fn extend(
         &self,
         block: &Block,
         s: &Surface,
+        point: &VertexPoint,
         work: &mut Workspace,
         paths: &mut PathScratch,
-        guided_pdf: impl Fn(&Guide, Vec3) -> f32,
+        guided_pdf: impl Fn(Vec3) -> f32,
     ) {
-        let VertexPoint { id, bsdf, .. } = paths.points.get(s.number);
+        let VertexPoint { id, bsdf, share, .. } = *point;
         let roulette = block.depth >= self.roulette_depth && block.depth < self.max_depth;
         let lobe = if roulette || s.material.picks_lobe() {
             id.sampler.get_2d(id.index, Dim::at(block.depth, Slot::LobeAndRoulette))
@@ -135,7 +136,7 @@ impl PathTracer {
             return;
         };
         let wi = s.v.frame.to_world(b.wi);
-        let mut beta = s.state.beta * b.weight;
+        let mut beta = s.state.beta * b.weight * share;
         if beta.is_black() || !s.v.is_consistent(wi) {
             work.avoided.absorbed += 1;
             return;
@@ -158,7 +159,7 @@ impl PathTracer {
             beta,
             pdf: if competes { b.pdf } else { f32::INFINITY },
             from: s.receiver,
-            guided_pdf: guided_pdf(&paths.guide, wi),
+            guided_pdf: guided_pdf(wi),
             eta2,
             index: s.state.index,
         };
@@ -192,20 +193,20 @@ impl Block<'_> {
                 _ => point.id.sampler.get_2d(point.id.index, light_dim(self.depth, number)),
             };
             if let Some(l) = light.sample_li(&s.receiver, u) {
-                self.connect(s, ChosenLight { light: number, pmf: 1.0 }, &l, false, work, paths);
+                self.connect(s, ChosenLight { light: number, pmf: 1.0 }, &l, 1.0, work, paths);
             }
         }
     }
 
-    /// A shadow ray to what was sampled of a light; `alone` where no scattered ray competes. (Always inlined: with two callers it would be a call in the loop that
-    /// most renders run.)
+    /// A shadow ray to what was sampled of a light, with which so many scattered rays compete. (Always inlined: with two
+    /// callers it would be a call in the loop that most renders run.)
     #[inline(always)]
     pub(super) fn connect(
         &self,
         s: &Surface,
         chosen: ChosenLight,
         l: &LightSample,
-        alone: bool,
+        scattered: f32,
         work: &mut Workspace,
         paths: &mut PathScratch,
     ) {
@@ -218,7 +219,8 @@ impl Block<'_> {
             return;
         }
         let pdf = chosen.pmf * l.pdf;
-        let weight = if l.delta || alone || !self.mis { 1.0 } else { power(pdf, e.pdf) };
+        let alone = l.delta || scattered == 0.0 || !self.mis;
+        let weight = if alone { 1.0 } else { power(pdf, scattered * e.pdf) };
         let id = paths.points.get(s.number).id;
         work.shadow.push(&s.v.spawn_to(l.wi, l.dist, key(&id, self.depth) ^ SHADOW_KEY));
         let ask = l.li.is_none().then_some(chosen.light);

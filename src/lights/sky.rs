@@ -21,7 +21,6 @@ pub use options::{SkyOptions, SkySampling};
 use placed::{PlacedDisc, Turn};
 use plan::{Level, Plan};
 use product::{Choice, ProductTable};
-use std::cell::RefCell;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -79,15 +78,21 @@ impl SkyLight {
             Some(radiance) => plan_constant(&*sky, levels, f64::from(radiance.luminance()), sampling),
             None => plan::plan(&*sky, levels, sampling),
         };
-        // Of a constant sky without discs nothing need be known, unless a table is asked for.
-        let levels = if is_plain && sampling != SkySampling::Table { Vec::new() } else { Level::all(&*sky) };
+        // Of a constant sky without discs nothing need be known, unless a table is asked for; products need no level but
+        // the finest.
+        let levels = match sampling {
+            SkySampling::Table => Level::all(&*sky),
+            _ if is_plain => Vec::new(),
+            SkySampling::Product => vec![Level::finest(&*sky)],
+            SkySampling::Compensated | SkySampling::Cosine => Level::all(&*sky),
+        };
         let plan = match sampling {
             SkySampling::Product if !is_plain => None,
             _ => Some(plan_of(&levels)),
         };
         let Some(plan) = plan else {
             let discs = place(&vec![0.0; sky.discs().len()]);
-            let table = ProductTable::new(&*sky, &levels, &discs, turn, intensity);
+            let table = ProductTable::new(&*sky, &levels[0], &discs, turn, intensity);
             let map_total = table.as_ref().map_or(0.0, ProductTable::map_flux);
             let total = (map_total + disc_total) * f64::from(intensity);
             let map = table.map_or(MapSampler::None, MapSampler::Product);
@@ -342,32 +347,27 @@ impl Light for SkyLight {
     }
 }
 
-thread_local! {
-    static GUIDE: RefCell<Guide> = RefCell::default();
-}
-
 /// What `f` makes of a receiver that scatters evenly, for callers that know nothing of its surface; None where nothing
 /// can arrive.
 fn with_even_guide<T>(light: &SkyLight, at: &Receiver, f: impl FnOnce(&Guide) -> T) -> Option<T> {
-    GUIDE.with_borrow_mut(|guide| {
-        let lobes = Lobes { wo: at.ns, scattering: Scattering::EVEN };
-        light.prepare(at, &lobes, guide).then(|| f(guide))
-    })
+    let mut guide = Guide::default();
+    let lobes = Lobes { wo: at.ns, scattering: Scattering::EVEN, alone: true };
+    light.prepare(at, &lobes, &mut guide).then(|| f(&guide))
 }
 
 impl GuidedLight for SkyLight {
     fn prepare(&self, at: &Receiver, lobes: &Lobes, guide: &mut Guide) -> bool {
         let MapSampler::Product(table) = &self.map else { return false };
-        table.weigh(at, lobes, guide)
+        table.prepare(at, lobes, guide)
     }
 
     fn sample(&self, at: &Receiver, guide: &Guide, u: [f32; 2]) -> Option<LightSample> {
         let MapSampler::Product(table) = &self.map else { return None };
         let (wi, pdf) = match table.sample(guide, extend_unit(u))? {
-            Choice::Map { at: c, pmf } => {
-                let d = self.sky.direction(c);
+            Choice::Map { at: c, cell } => {
+                let (d, solid_angle) = self.sky.direction_and_density(c);
                 let w = self.turn.map_or(d, |t| t.to_world(d)).as_vec3();
-                let map = cell_density(&*self.sky, table.grid(), c, pmf);
+                let map = if solid_angle > 0.0 { table.density(guide, cell) / solid_angle } else { 0.0 };
                 (w, (map + self.disc_density(table, guide, w)) as f32)
             }
             Choice::Disc { disc, u } => {
@@ -381,11 +381,12 @@ impl GuidedLight for SkyLight {
 
     fn pdf(&self, at: &Receiver, guide: &Guide, wi: Vec3) -> f32 {
         let MapSampler::Product(table) = &self.map else { return 0.0 };
-        if wi.dot(at.ng) < 0.0 || guide.total() <= 0.0 {
+        if wi.dot(at.ng) < 0.0 {
             return 0.0;
         }
         let c = self.locate(wi);
-        let map = cell_density(&*self.sky, table.grid(), c, table.pmf(guide, c));
+        let solid_angle = self.sky.solid_angle_density(c);
+        let map = if solid_angle > 0.0 { table.density(guide, table.cell_of(c)) / solid_angle } else { 0.0 };
         (map + self.disc_density(table, guide, wi)) as f32
     }
     fn contrast(&self) -> f32 {

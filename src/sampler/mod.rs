@@ -129,6 +129,15 @@ impl PixelSampler {
         }
     }
 
+    /// The points of this pixel where each of its samples takes `n`, from index `n * index` on.
+    #[inline(always)]
+    pub fn times(self, n: u32) -> Self {
+        match self.kind() {
+            Sampler::ZSobol => PixelSampler { key: [self.key[0], self.key[1].wrapping_mul(n)] },
+            Sampler::OwenSobol | Sampler::Independent => self,
+        }
+    }
+
     /// Two numbers in [0, 1) as 32-bit fractions.
     #[inline(always)]
     pub fn bits_2d(&self, index: u32, dim: Dim) -> [u32; 2] {

@@ -200,6 +200,10 @@ impl Skybox for Baked {
         self.cube.solid_angle_density(c)
     }
 
+    fn direction_and_density(&self, c: ChartPoint) -> (DVec3, f64) {
+        self.cube.direction_and_density(c)
+    }
+
     fn cell_integrals(&self, grid: ChartGrid) -> Vec<f64> {
         self.cube.cell_integrals(grid)
     }

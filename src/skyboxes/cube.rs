@@ -326,6 +326,14 @@ impl Skybox for Cube {
         4.0 * r * r.sqrt()
     }
 
+    #[inline]
+    fn direction_and_density(&self, c: ChartPoint) -> (DVec3, f64) {
+        let f = &FACES[c.chart as usize];
+        let (s, t) = (2.0 * c.u - 1.0, 1.0 - 2.0 * c.v);
+        let r = 1.0 / (1.0 + s * s + t * t).sqrt();
+        ((f.major + f.across * s + f.up * t) * r, 4.0 * r * r * r)
+    }
+
     fn cell_integrals(&self, grid: ChartGrid) -> Vec<f64> {
         if self.size <= SMALL && grid == self.grid() {
             return integrate_cells(grid, |c| {

@@ -112,6 +112,12 @@ impl Skybox for Sphere {
         TAU * PI * (c.v * PI).sin()
     }
 
+    fn direction_and_density(&self, c: ChartPoint) -> (DVec3, f64) {
+        let (sin_a, cos_a) = ((c.u - 0.5) * TAU).sin_cos();
+        let (sin_p, cos_p) = (c.v * PI).sin_cos();
+        (DVec3::new(sin_p * cos_a, cos_p, sin_p * sin_a), TAU * PI * sin_p)
+    }
+
     fn cell_integrals(&self, grid: ChartGrid) -> Vec<f64> {
         let (w, h) = (self.image.width, self.image.height);
         let across = Spread::even(w, grid.width as usize);

@@ -6,13 +6,12 @@ use std::str::FromStr;
 /// How directions to the map of a sky are sampled; discs are sampled uniformly within their cones by all methods.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SkySampling {
-    /// By the luminance times what the surface makes of it, in coarse cells. A constant sky is left to BSDF
-    /// sampling.
+    /// By the luminance times what the surface makes of it, from tables by the surface's direction. A constant sky is left
+    /// to BSDF sampling. The best use of time under most skies (measured: benches/README.md).
+    #[default]
     Product,
     /// By the luminance that rises above the average, where that pays: BSDF sampling finds the rest as well (Karlik et
-    /// al. 2019). Under a constant sky nothing is left and there is no sample. The best use of time under most skies
-    /// (measured: benches/README.md).
-    #[default]
+    /// al. 2019). Under a constant sky nothing is left and there is no sample.
     Compensated,
     /// By luminance.
     Table,
@@ -23,8 +22,8 @@ pub enum SkySampling {
 impl SkySampling {
     /// All methods with their names, as scene files spell them.
     pub const NAMES: [(&'static str, SkySampling); 4] = [
-        ("compensated", SkySampling::Compensated),
         ("product", SkySampling::Product),
+        ("compensated", SkySampling::Compensated),
         ("table", SkySampling::Table),
         ("cosine", SkySampling::Cosine),
     ];

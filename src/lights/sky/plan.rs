@@ -76,11 +76,6 @@ impl Level {
         self.grid
     }
 
-    /// Number of cells.
-    pub fn cells(&self) -> usize {
-        self.integral.len()
-    }
-
     /// Luminance over a cell.
     pub fn integral(&self, i: usize) -> f64 {
         self.integral[i]
@@ -92,7 +87,7 @@ impl Level {
     }
 
     /// The finest that fits.
-    fn finest(sky: &dyn Skybox) -> Self {
+    pub fn finest(sky: &dyn Skybox) -> Self {
         let mut grid = sky.grid();
         while grid.cells() > MAX_CELLS {
             grid.width = grid.width.div_ceil(2);

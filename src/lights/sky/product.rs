@@ -1,65 +1,91 @@
 //! Product sampling: directions by what the sky brings times what the surface makes of it.
 //!
-//! The charts of the sky are cut into a few hundred coarse cells, each with its flux, the middle of its light, and a
-//! bound on its reach about that. At a surface point every coarse cell is weighed by its flux and by how the surface
-//! scatters from there (its even part by the cosine, clipped by the horizon as far as the cell reaches; its facets by
-//! their distribution, widened by the cell), rows of cells and then a cell are chosen by inversion, and a table of its
-//! own, by luminance alone, finds the direction within. Discs are cells, too. In the manner of Conty Estevez and Lecocq
-//! ("Fast product importance sampling of environment maps", SIGGRAPH 2018 talks), with what is left of both numbers
-//! handed on from step to step, so that stratified points stay stratified.
+//! The sky is cut into about a thousand cells, small where its light varies ([`partition`]); discs are cells, too. For
+//! each of about a thousand normals there is a table of what every cell brings to a surface that scatters evenly, its
+//! cosine clipped by the horizon; for each of as many mirrored directions, and some widths of the lobe about them, one of
+//! what facets make of it. A surface point takes the table of its normal, of its mirrored direction, or both, each as
+//! often as it counts. Tables are made when they are first asked for, from their number alone, so that no picture depends
+//! on when that was. Choices are by inversion, with what is left of both numbers handed on, so that stratified points stay
+//! stratified.
 //!
-//! Weights may be wrong by any factor and only cost variance, as long as none is zero where light is scattered.
+//! Conty Estevez and Lecocq ("Fast product importance sampling of environment maps", SIGGRAPH 2018 talks) weigh the cells
+//! anew for every surface point, which takes longer than a ray; tables by normal were Lawrence et al.'s ("Adaptive
+//! numerical cumulative distribution functions for efficient importance sampling", EGSR 2005).
+//!
+//! Light samples that compete with scattered rays leave to those what they find as well: of each cell they have what is
+//! brighter than the mean of what the surface sees (Karlik et al., "MIS Compensation: Optimizing Sampling Techniques in
+//! Multiple Importance Sampling", 2019, but for each table, not for the whole sky).
+//!
+//! Weights may be wrong by any factor and only cost variance, as long as none is zero where
+//! light is scattered that nothing else finds.
 
+mod octahedron;
+mod partition;
+mod table;
 mod weigh;
 
 use super::placed::{PlacedDisc, Turn};
-use super::plan::{Level, ordered_sum};
+use super::plan::Level;
 use crate::base::light::{Guide, Lobes, Receiver};
-use crate::base::skybox::{ChartGrid, ChartPoint, Skybox};
+use crate::base::skybox::{ChartPoint, Skybox};
+use crate::math::Frame;
 use crate::math::simd::dispatch;
-use crate::sampling::distribution::ChartDistribution;
-use glam::{DVec3, Vec3};
-use weigh::{Both, Cells, Even, Sum};
+use glam::Vec3;
+use partition::Partition;
+use std::sync::OnceLock;
+use table::{FIRST_BACK, Place, SECOND_BACK, SWAPPED, Table};
+use weigh::{About, Columns, Even, Facets};
 
-/// Cells along a chart's sides: of one chart that is the whole sphere, and of each of several.
-const SPHERE_CELLS: [u32; 2] = [32, 16];
-const FACE_CELLS: [u32; 2] = [8, 8];
-/// Rows of cells are padded to a multiple of this: what vector registers hold.
-const LANES: usize = 8;
-/// Most cells of a level that the middles of coarse cells are made from.
-const MIDDLE_CELLS: usize = 1 << 20;
-/// A coarser table is taken where it adds no more than this part to the second moment of radiance over density. What is in
-/// the way adds more to most pictures, and a fine table of a large sky costs a miss of the caches a lookup; at 0.05
-/// pictures are noisier by a third under a sun of some texels.
-const TOLERANCE: f64 = 0.01;
-/// Largest f64 below one.
-const ONE_MINUS: f64 = 1.0 - f64::EPSILON / 2.0;
+/// Widths of facets' lobes that have tables of their own, each sqrt(2) times the next.
+const WIDTHS: usize = 12;
+/// Kinds of surfaces.
+const KINDS: usize = 1 + WIDTHS;
+/// What counts as a peak: a cell of so many times the mean radiance.
+const PEAK: f64 = 32.0;
+/// Most of a table's weight that peaks may have together. A sun that is hidden leaves all to the other cells, which must
+/// not go without samples; and halves are what stratified points are best at.
+const MOST_OF_ALL: f32 = 0.5;
+/// Light samples that have help find nothing where less than this part of the light is left for them.
+const LEAST_LEFT: f64 = 1e-3;
+/// A light sample that has help is taken so many times as often as the part of the light that is left for it: at a
+/// hundredth, the one in 25 brings a noise of 4 % where a scattered ray brings all of its own.
+const WORTH: f32 = 4.0;
+/// Cells, with the discs.
+const MOST_CELLS: usize = 1024;
+/// More are left to BSDF sampling. (Skies have one or two.)
+const MOST_DISCS: usize = 256;
+/// Tables of one kind: by direction, and one for surfaces that scatter all round.
+const ALL_ROUND: usize = octahedron::COUNT;
+const OF_KIND: usize = ALL_ROUND + 1;
 
-/// The table.
+/// Tables of one kind, made on demand; None where all is black.
+type Tables = OnceLock<Vec<OnceLock<Option<Box<Table>>>>>;
+
+/// The tables, and the cells that they choose among.
 pub(super) struct ProductTable {
-    /// Of the cells that the parts choose among.
-    grid: ChartGrid,
-    /// Coarse cells along a chart's sides.
-    across: usize,
-    down: usize,
-    /// Columns of a row of `cells`.
-    stride: usize,
-    /// By row and column; the discs after the last row.
-    cells: Cells,
-    /// The sky within each coarse cell, in the order of `cells`; None where it is black.
-    parts: Vec<Option<ChartDistribution>>,
+    partition: Partition,
+    /// The discs after the cells of the map.
+    cells: Columns,
+    /// Of the map's cells, see [`partition::CellLight::sides`].
+    sides: Vec<[Vec3; 2]>,
+    /// Cells far brighter than the mean.
+    peaks: Vec<usize>,
+    /// Of surfaces that scatter evenly, then of facets by width; then again for light samples that have help.
+    tables: [Tables; 2 * KINDS],
     /// See [`ProductTable::peak`].
     peak: f64,
+    /// See [`ProductTable::map_flux`].
+    map_flux: f64,
 }
 
 /// What was chosen.
 pub(super) enum Choice {
-    /// A place within a cell of the sky's map, with the probability of that cell of the grid.
+    /// A place within a cell of the map.
     Map {
         /// On the charts.
         at: ChartPoint,
-        /// Of the cell of [`ProductTable::grid`].
-        pmf: f64,
+        /// Number of the cell.
+        cell: usize,
     },
     /// A disc, and two numbers for a place in it.
     Disc {
@@ -70,216 +96,233 @@ pub(super) enum Choice {
     },
 }
 
-/// The first of the cells `0..n` that are the part `i` of `parts`.
-fn edge(i: usize, n: u32, parts: usize) -> u32 {
-    (i as u64 * u64::from(n) / parts as u64) as u32
+/// How often a sample is worth its ray that would find `total` of the `whole` light which scattered rays find anyway.
+fn worth(total: f32, whole: f32) -> f32 {
+    match whole > total * WORTH {
+        true => WORTH * total / whole,
+        false => 1.0,
+    }
 }
 
-/// The part of `parts` that cell `x` of `n` lies in.
-fn part_of(x: u32, n: u32, parts: usize) -> usize {
-    let guess = (u64::from(x) * parts as u64 / u64::from(n)) as usize;
-    if guess + 1 < parts && edge(guess + 1, n, parts) <= x { guess + 1 } else { guess }
-}
-
-/// The coarsest level that loses little against the finest.
-fn choose_level(levels: &[Level]) -> &Level {
-    let finest = &levels[0];
-    // The second moment of radiance over a density that is proportional to it on average over each cell.
-    let moment = |l: &Level| {
-        let part = |i: usize| match l.integral(i) {
-            flux if flux > 0.0 => l.square(i) * (l.solid_angle(i) / flux),
-            _ => 0.0,
-        };
-        ordered_sum(l.cells(), part)
-    };
-    let best = moment(finest);
-    let fits = |l: &&Level| moment(l) <= best * (1.0 + TOLERANCE);
-    levels.iter().rev().find(fits).unwrap_or(finest)
+/// The width, of those that have tables, next to a lobe's.
+fn width_of(alpha: f32) -> usize {
+    (-2.0 * alpha.max(1e-4).log2() + 0.5).clamp(0.0, (WIDTHS - 1) as f32) as usize
 }
 
 impl ProductTable {
     /// Of a sky as it is turned; None if it is black. The discs are as bright as `intensity` makes them.
     pub fn new(
         sky: &dyn Skybox,
-        levels: &[Level],
+        level: &Level,
         discs: &[PlacedDisc],
         turn: Option<Turn>,
         intensity: f32,
     ) -> Option<Self> {
-        let level = choose_level(levels);
-        let grid = level.grid();
-        let [across, down] = if grid.count == 1 { SPHERE_CELLS } else { FACE_CELLS };
-        let (across, down) = (across.min(grid.width) as usize, down.min(grid.height) as usize);
-        let stride = across.next_multiple_of(LANES);
-        let rows = grid.count as usize * down;
-        let mut table = ProductTable {
-            grid,
-            across,
-            down,
-            stride,
-            cells: Cells::default(),
-            peak: levels[0].peak(),
-            parts: Vec::with_capacity(rows * stride),
+        if discs.len() > MOST_DISCS {
+            return None;
+        }
+        let partition = Partition::new(level, MOST_CELLS - discs.len());
+        let lights = partition.lights(sky, level);
+        // Integrals of the map are without the intensity.
+        let flux_of = |d: &PlacedDisc| {
+            let radiance = d.radiance.luminance() / intensity.max(f32::MIN_POSITIVE);
+            f64::from(radiance) * std::f64::consts::TAU * f64::from(d.m)
         };
-        let disc_rows = discs.len().div_ceil(stride);
-        table.cells.resize((rows + disc_rows) * stride);
-        let coarse = levels.iter().find(|l| l.cells() <= MIDDLE_CELLS).unwrap_or(level);
-        let middles = table.middles(sky, coarse);
-        for row in 0..rows {
-            for column in 0..stride {
-                let part = (column < across).then(|| table.part(level, row, column)).flatten();
-                if let Some(part) = &part {
-                    let (middle, reach) = table.reach(sky, row, column, middles[row * across + column]);
-                    let world = turn.map_or(middle, |t| t.to_world(middle)).as_vec3();
-                    table.cells.set(row * stride + column, world, reach, part.total() as f32);
-                }
-                table.parts.push(part);
+        let map_flux: f64 = lights.iter().map(|l| l.flux).sum();
+        let total = map_flux + discs.iter().map(flux_of).sum::<f64>();
+        if !(total > 0.0 && total.is_finite()) {
+            return None;
+        }
+        let part = |flux: f64| {
+            // What is lit is never without weight.
+            let least = if flux > 0.0 { f32::MIN_POSITIVE / f32::EPSILON } else { 0.0 };
+            ((flux / total) as f32).max(least)
+        };
+        let (mut cells, mut sides) = (Columns::default(), Vec::with_capacity(lights.len()));
+        for l in &lights {
+            let world = turn.map_or(l.middle, |t| t.to_world(l.middle)).as_vec3();
+            cells.push(world, l.reach, part(l.flux), l.angle as f32);
+            sides.push(l.sides.map(|s| turn.map_or(s, |t| t.to_world(s)).as_vec3()));
+        }
+        for disc in discs {
+            cells.push(disc.frame.n, disc.sin, part(flux_of(disc)), std::f32::consts::TAU * disc.m);
+        }
+        let bright = |flux: f64, angle: f64| flux * (4.0 * std::f64::consts::PI) > PEAK * total * angle;
+        let map = lights.iter().map(|l| bright(l.flux, l.angle));
+        let all = map.chain(discs.iter().map(|d| bright(flux_of(d), std::f64::consts::TAU * f64::from(d.m))));
+        let peaks = all.enumerate().filter(|(_, bright)| *bright).map(|(i, _)| i).collect();
+        let tables = std::array::from_fn(|_| Tables::new());
+        Some(ProductTable { partition, cells, sides, peaks, tables, peak: level.peak(), map_flux })
+    }
+
+    /// Numbers of the tables of a receiver, and how often each is asked; false if nothing can arrive.
+    #[inline]
+    pub fn prepare(&self, at: &Receiver, lobes: &Lobes, guide: &mut Guide) -> bool {
+        let s = &lobes.scattering;
+        let first = if lobes.alone { 0 } else { KINDS };
+        let number = |kind: usize, which: usize| ((first + kind) * OF_KIND + which) as u32;
+        let even = number(0, if at.ns == Vec3::ZERO { ALL_ROUND } else { octahedron::find(at.ns) });
+        if s.facets <= 0.0 || at.ns == Vec3::ZERO {
+            guide.tables = [even; 2];
+            guide.shares = [1.0, 0.0];
+            let table = self.table(even);
+            guide.worth = table.map_or(0.0, |t| worth(t.total, t.whole));
+            return table.is_some();
+        }
+        let mirrored = (2.0 * at.ns.dot(lobes.wo) * at.ns - lobes.wo).normalize_or(at.ns);
+        let facets = number(1 + width_of(s.alpha), octahedron::find(mirrored));
+        let sums = |number: u32, part: f32| match self.table(number) {
+            Some(t) if part > 0.0 => [part * t.total, part * t.whole],
+            _ => [0.0; 2],
+        };
+        let (of_even, of_facets) = (sums(even, s.even), sums(facets, s.facets));
+        let sum = of_even[0] + of_facets[0];
+        guide.tables = [even, facets];
+        guide.shares = [of_even[0] / sum, of_facets[0] / sum];
+        guide.worth = worth(sum, of_even[1] + of_facets[1]);
+        sum > 0.0 && sum.is_finite()
+    }
+
+    /// The table of a number; None if all is black there. After the first time, two loads.
+    #[inline]
+    fn table(&self, number: u32) -> Option<&Table> {
+        let (kind, which) = (number as usize / OF_KIND, number as usize % OF_KIND);
+        let of_kind = self.tables[kind].get_or_init(|| (0..OF_KIND).map(|_| OnceLock::new()).collect());
+        of_kind[which].get_or_init(|| self.make(kind, which)).as_deref()
+    }
+
+    #[cold]
+    fn make(&self, kind: usize, which: usize) -> Option<Box<Table>> {
+        let cells = &self.cells;
+        let (axis, spread) = if which == ALL_ROUND { (Vec3::Y, 0.0) } else { octahedron::middle(which) };
+        let about = About { axis, spread };
+        let mut weights = vec![1.0; cells.flux.len()];
+        match kind % KINDS {
+            _ if which == ALL_ROUND => {}
+            0 => dispatch(Even { cells, normals: about, weights: &mut weights }),
+            width => {
+                let alpha = 0.5f32.powf(0.5 * (width - 1) as f32);
+                dispatch(Facets { cells, mirrored: about, alpha, weights: &mut weights });
             }
         }
-        for (i, disc) in discs.iter().enumerate() {
-            // Integrals of the map are without the intensity.
-            let radiance = disc.radiance.luminance() / intensity.max(f32::MIN_POSITIVE);
-            let flux = radiance * std::f32::consts::TAU * disc.m;
-            table.cells.set(rows * stride + i, disc.frame.n, disc.sin, flux);
-        }
-        let is_black = table.cells.flux.iter().all(|f| *f <= 0.0);
-        (!is_black).then_some(table)
-    }
-
-    /// Chart, and the ranges of cells of the grid in u and v of a coarse cell.
-    fn ranges(&self, row: usize, column: usize) -> (u32, [u32; 2], [u32; 2]) {
-        let span = |i: usize, n: u32, parts: usize| [edge(i, n, parts), edge(i + 1, n, parts)];
-        let (chart, y) = (row / self.down, row % self.down);
-        (chart as u32, span(column, self.grid.width, self.across), span(y, self.grid.height, self.down))
-    }
-
-    /// The distribution of luminance within a coarse cell.
-    fn part(&self, level: &Level, row: usize, column: usize) -> Option<ChartDistribution> {
-        let (chart, [x0, x1], [y0, y1]) = self.ranges(row, column);
-        let line = |y: u32| {
-            let first = (chart * self.grid.height + y) as usize * self.grid.width as usize;
-            (x0..x1).map(move |x| level.integral(first + x as usize))
-        };
-        let weights: Vec<f64> = (y0..y1).flat_map(line).collect();
-        ChartDistribution::new(1, (x1 - x0) as usize, (y1 - y0) as usize, &weights)
-    }
-
-    /// Of each coarse cell, row by row without padding, the mean direction of its light, not normalised.
-    fn middles(&self, sky: &dyn Skybox, level: &Level) -> Vec<DVec3> {
-        let ChartGrid { width, height, .. } = level.grid();
-        let mut sums = vec![DVec3::ZERO; self.grid.count as usize * self.down * self.across];
-        for i in 0..level.cells() {
-            let (row, x) = (i as u32 / width, i as u32 % width);
-            let (chart, y) = (row / height, row % height);
-            let u = (f64::from(x) + 0.5) / f64::from(width);
-            let v = (f64::from(y) + 0.5) / f64::from(height);
-            let coarse = (chart as usize * self.down + part_of(y, height, self.down)) * self.across;
-            sums[coarse + part_of(x, width, self.across)] +=
-                sky.direction(ChartPoint { chart, u, v }) * level.integral(i);
-        }
-        sums
-    }
-
-    /// The middle of a coarse cell's light and how far the cell reaches about it.
-    fn reach(&self, sky: &dyn Skybox, row: usize, column: usize, middle: DVec3) -> (DVec3, f32) {
-        let (chart, x, y) = self.ranges(row, column);
-        let at = |[a, b]: [u32; 2], n: u32, part: f64| {
-            (f64::from(a) + part * (f64::from(b) - f64::from(a))) / f64::from(n)
-        };
-        let points = (0..25).map(|k| {
-            let part = |k: i32| f64::from(k) / 4.0;
-            let (u, v) = (at(x, self.grid.width, part(k % 5)), at(y, self.grid.height, part(k / 5)));
-            sky.direction(ChartPoint { chart, u, v })
-        });
-        let middle = middle
-            .try_normalize()
-            .unwrap_or_else(|| points.clone().sum::<DVec3>().try_normalize().unwrap_or(DVec3::Y));
-        // Chords are longer than sines; the margin is for what lies between the points.
-        let reach = points.map(|p| (p - middle).length()).fold(0.0, f64::max);
-        (middle, (1.02 * reach) as f32)
-    }
-
-    /// Weighs all cells for a receiver; false if nothing can arrive.
-    pub fn weigh(&self, at: &Receiver, lobes: &Lobes, guide: &mut Guide) -> bool {
-        let n = self.cells.flux.len();
-        guide.weights.resize(n, 0.0);
-        guide.sums.resize(n / self.stride, 0.0);
-        let weights = &mut guide.weights[..];
-        if at.ns == Vec3::ZERO {
-            weights.copy_from_slice(&self.cells.flux);
-        } else if lobes.scattering.facets > 0.0 {
-            dispatch(Both { cells: &self.cells, n: at.ns, lobes: *lobes, weights });
+        let sum = |of: &[f32]| of.iter().zip(&weights).map(|(x, w)| f64::from(x * w)).sum::<f64>();
+        if kind < KINDS {
+            weights.iter_mut().zip(&cells.flux).for_each(|(w, flux)| *w *= flux);
+            self.limit_peaks(&mut weights);
         } else {
-            dispatch(Even { cells: &self.cells, n: at.ns, weights });
+            let (flux, angle) = (sum(&cells.flux), sum(&cells.angle));
+            let mean = if angle > 0.0 { (flux / angle) as f32 } else { 0.0 };
+            let light = cells.flux.iter().zip(&cells.angle);
+            weights.iter_mut().zip(light).for_each(|(w, (flux, angle))| *w *= (flux - mean * angle).max(0.0));
+            // What rounding leaves of an even sky is nothing.
+            let left: f64 = weights.iter().map(|w| f64::from(*w)).sum();
+            if left < LEAST_LEFT * flux {
+                return None;
+            }
+            let mut table = Table::new(&weights, &self.places(axis, &weights))?;
+            table.whole = flux as f32;
+            return Some(table);
         }
-        dispatch(Sum { weights: &guide.weights, stride: self.stride, sums: &mut guide.sums });
-        guide.total() > 0.0
+        Table::new(&weights, &self.places(axis, &weights))
+    }
+
+    /// Takes from the peaks what they have beyond their part.
+    fn limit_peaks(&self, weights: &mut [f32]) {
+        let peaks: f32 = self.peaks.iter().map(|&i| weights[i]).sum();
+        let rest = weights.iter().sum::<f32>() - peaks;
+        let most = rest * MOST_OF_ALL / (1.0 - MOST_OF_ALL);
+        if rest > 0.0 && peaks > most {
+            self.peaks.iter().for_each(|&i| weights[i] *= most / peaks);
+        }
+    }
+
+    /// Where cells lie in a plane, seen from within along an axis: circles about it are squares, as those of points are
+    /// that are mapped to a disc (Shirley and Chiu 1997), and areas are nearly the same as on the sphere.
+    ///
+    /// Cells without weight are nowhere.
+    fn places(&self, axis: Vec3, weights: &[f32]) -> Vec<Place> {
+        let frame = Frame::from_z(axis);
+        let Columns { x, y, z, .. } = &self.cells;
+        let point = |d: Vec3| {
+            let d = frame.to_local(d);
+            let scale = (1.0 - d.z).max(0.0).sqrt() / d.x.abs().max(d.y.abs()).max(1e-6);
+            [d.x * scale, d.y * scale]
+        };
+        let mut places = vec![Place::default(); weights.len()];
+        let lit = places.iter_mut().enumerate().filter(|(i, _)| weights[*i] > 0.0);
+        for (i, place) in lit {
+            let middle = Vec3::new(x[i], y[i], z[i]);
+            place.at = point(middle);
+            if let Some(sides) = self.sides.get(i) {
+                let way = |side: Vec3| {
+                    let to = point(middle + 0.5 * side);
+                    [to[0] - place.at[0], to[1] - place.at[1]]
+                };
+                let [a, b] = sides.map(way);
+                let swapped = a[0].abs() + b[1].abs() < a[1].abs() + b[0].abs();
+                let (first, second) = if swapped { (a[1], b[0]) } else { (a[0], b[1]) };
+                let bit = |is: bool, bit: u16| if is { bit } else { 0 };
+                place.lie =
+                    bit(swapped, SWAPPED) | bit(first < 0.0, FIRST_BACK) | bit(second < 0.0, SECOND_BACK);
+            }
+        }
+        // Peaks first: where they have a half, it is one half of the numbers.
+        self.peaks.iter().for_each(|&i| places[i].at[1] -= 4.0);
+        places
     }
 
     /// A cell and a place in it.
+    #[inline]
     pub fn sample(&self, guide: &Guide, u: [f64; 2]) -> Option<Choice> {
-        let total = guide.total();
-        let y = u[1] * total;
-        // Counted, not searched: a few vector instructions without a branch to be foretold.
-        let row = guide.sums.iter().map(|s| usize::from(*s <= y)).sum::<usize>().min(guide.sums.len() - 1);
-        let before = if row > 0 { guide.sums[row - 1] } else { 0.0 };
-        let of_row = guide.sums[row] - before;
-        let weights = &guide.weights[row * self.stride..][..self.stride];
-        // Rows without weight are never chosen; rounding may leave the last one so.
-        if of_row <= 0.0 {
-            return None;
+        let (mut number, mut x) = (guide.tables[0], u[0]);
+        if guide.worth < 1.0 {
+            let worth = f64::from(guide.worth);
+            if x >= worth {
+                return None;
+            }
+            x /= worth;
         }
-        let y = ((y - before) / of_row).clamp(0.0, ONE_MINUS);
-        let x = u[0] * of_row;
-        let (mut column, mut sum, mut left) = (0, 0.0, x);
-        for (i, w) in (1..).zip(&weights[..self.stride - 1]) {
-            sum += f64::from(*w);
-            let beyond = x >= sum;
-            column = if beyond { i } else { column };
-            left = if beyond { x - sum } else { left };
+        if guide.shares[1] > 0.0 {
+            let first = f64::from(guide.shares[0]);
+            (number, x) = match x < first {
+                true => (number, x / first),
+                false => (guide.tables[1], (x - first) / (1.0 - first)),
+            };
         }
-        let weight = f64::from(weights[column]);
-        if weight <= 0.0 {
-            return None;
-        }
-        let u = [(left / weight).clamp(0.0, ONE_MINUS), y];
-        let cell = row * self.stride + column;
-        let Some(part) = self.parts.get(cell) else {
-            return Some(Choice::Disc { disc: cell - self.parts.len(), u });
-        };
-        let c = part.as_ref()?.sample(u);
-        let (chart, [x0, _], [y0, _]) = self.ranges(row, column);
-        // Off the border by more than the rounding of a direction to f32 can carry it back over.
-        let inside = |u: f64, n: u32| {
-            let rim = f64::from(n) * 1.5e-7;
-            u.clamp(rim, 1.0 - rim)
-        };
-        let at = ChartPoint {
-            chart,
-            u: (f64::from(x0 + c.x) + inside(c.du[0], self.grid.width)) / f64::from(self.grid.width),
-            v: (f64::from(y0 + c.y) + inside(c.du[1], self.grid.height)) / f64::from(self.grid.height),
-        };
-        Some(Choice::Map { at, pmf: weight / total * c.pmf })
+        let found = self.table(number)?.find([x, u[1]]);
+        let places = self.partition.places();
+        Some(match places.get(found.cell) {
+            Some(place) => Choice::Map { at: place.point(found.u), cell: found.cell },
+            None => Choice::Disc { disc: found.cell - places.len(), u: found.u },
+        })
     }
 
-    /// The probability of the cell of the grid that a point lies in.
-    pub fn pmf(&self, guide: &Guide, at: ChartPoint) -> f64 {
-        let cell = |u: f64, n: u32| ((u * f64::from(n)) as u32).min(n - 1);
-        let (x, y) = (cell(at.u, self.grid.width), cell(at.v, self.grid.height));
-        let column = part_of(x, self.grid.width, self.across);
-        let part_row = part_of(y, self.grid.height, self.down);
-        let row = at.chart as usize * self.down + part_row;
-        let index = row * self.stride + column;
-        let weight = f64::from(guide.weights[index]);
-        let Some(Some(part)) = self.parts.get(index).filter(|_| weight > 0.0) else { return 0.0 };
-        let (x0, y0) =
-            (edge(column, self.grid.width, self.across), edge(part_row, self.grid.height, self.down));
-        weight / guide.total() * part.pmf(0, x - x0, y - y0)
+    /// The probability that a sample is taken, and of a cell; discs come after those of the map.
+    #[inline]
+    pub fn pmf(&self, guide: &Guide, cell: usize) -> f64 {
+        let one = |k: usize| match guide.shares[k] {
+            s if s > 0.0 => f64::from(s) * self.table(guide.tables[k]).map_or(0.0, |t| t.pmf(cell)),
+            _ => 0.0,
+        };
+        (one(0) + one(1)) * f64::from(guide.worth)
+    }
+
+    /// The density per u and v of the charts within a cell of the map.
+    #[inline]
+    pub fn density(&self, guide: &Guide, cell: usize) -> f64 {
+        self.pmf(guide, cell) * self.partition.places()[cell].density
+    }
+
+    /// The cell of the map that a point lies in.
+    #[inline]
+    pub fn cell_of(&self, at: ChartPoint) -> usize {
+        self.partition.find(at)
     }
 
     /// The probability of a disc.
+    #[inline]
     pub fn disc_pmf(&self, guide: &Guide, disc: usize) -> f64 {
-        f64::from(guide.weights[self.parts.len() + disc]) / guide.total()
+        self.pmf(guide, self.partition.places().len() + disc)
     }
 
     /// Largest luminance of a cell of the finest grid, without the sky's intensity.
@@ -289,43 +332,27 @@ impl ProductTable {
 
     /// Flux of the map, without the sky's intensity.
     pub fn map_flux(&self) -> f64 {
-        self.cells.flux[..self.parts.len()].iter().map(|f| f64::from(*f)).sum()
+        self.map_flux
     }
 
-    /// See the field.
-    pub fn grid(&self) -> &ChartGrid {
-        &self.grid
-    }
-
-    /// The number of the coarse cell, or disc, that was chosen.
-    #[cfg(test)]
-    pub fn cell_of(&self, choice: &Choice) -> usize {
-        match choice {
-            Choice::Disc { disc, .. } => self.parts.len() + disc,
-            Choice::Map { at, .. } => {
-                let cell = |u: f64, n: u32| ((u * f64::from(n)) as u32).min(n - 1);
-                let column = part_of(cell(at.u, self.grid.width), self.grid.width, self.across);
-                let row = part_of(cell(at.v, self.grid.height), self.grid.height, self.down);
-                (at.chart as usize * self.down + row) * self.stride + column
-            }
-        }
+    /// Number of cells of the map.
+    pub fn cells(&self) -> usize {
+        self.partition.places().len()
     }
 
     /// For people.
     pub fn describe(&self) -> String {
-        let g = &self.grid;
-        format!(
-            "by {} coarse cells and the surface, within them by a table of {} x {} x {} cells",
-            g.count as usize * self.across * self.down,
-            g.count,
-            g.width,
-            g.height
-        )
+        format!("by {} cells and the surface", self.cells())
     }
 
     /// Bytes held.
     pub fn memory(&self) -> u64 {
-        let parts: u64 = self.parts.iter().flatten().map(ChartDistribution::memory).sum();
-        parts + 24 * self.cells.flux.len() as u64
+        let made = |t: &Tables| {
+            let all = t.get().map_or(&[][..], |t| t);
+            let tables = all.iter().filter_map(|t| t.get()?.as_deref());
+            size_of_val(all) + tables.map(Table::memory).sum::<usize>()
+        };
+        let tables: usize = self.tables.iter().map(made).sum();
+        self.partition.memory() + self.cells.memory() + tables as u64
     }
 }

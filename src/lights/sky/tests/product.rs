@@ -20,25 +20,26 @@ fn probabilities_of_all_cells_and_discs_sum_to_one() {
     each_sky(|what, sky| {
         let light = light(sky, SkySampling::Product, 30.0);
         let MapSampler::Product(table) = &light.map else { return };
-        let grid = *table.grid();
         let mut rng = TestRng::new(1);
         for scattering in SCATTERINGS {
             let at = facing(rng.direction());
             let mut guide = Guide::default();
-            let lobes = Lobes { wo: viewer(&mut rng, at.ns), scattering };
+            let lobes = Lobes { wo: viewer(&mut rng, at.ns), scattering, alone: true };
             if !light.prepare(&at, &lobes, &mut guide) {
                 continue;
             }
+            let grid = light.sky.grid();
             let (w, h) = (grid.width as usize, grid.height as usize);
             let map = (0..grid.cells()).map(|i| {
                 let u = ((i % w) as f64 + 0.5) / w as f64;
                 let v = ((i / w % h) as f64 + 0.5) / h as f64;
-                table.pmf(&guide, ChartPoint { chart: (i / (w * h)) as u32, u, v })
+                let c = ChartPoint { chart: (i / (w * h)) as u32, u, v };
+                table.density(&guide, table.cell_of(c)) / (w * h) as f64
             });
             let discs = (0..light.discs.len()).map(|d| table.disc_pmf(&guide, d));
             let sum = map.sum::<f64>() + discs.sum::<f64>();
-            // Each weight of a cell within its part is an f32, normalised over the part in f64.
-            assert!((sum - 1.0).abs() < 1e-6, "{what} {scattering:?}: {sum}");
+            // Two shares in f32.
+            assert!((sum - 1.0).abs() < 3e-7, "{what} {scattering:?}: {sum}");
         }
     });
 }
@@ -56,19 +57,26 @@ fn what_a_surface_makes_of_it_is_drawn_as_the_density_says() {
         for scattering in SCATTERINGS {
             let at = facing(rng.direction());
             let mut guide = Guide::default();
-            let lobes = Lobes { wo: viewer(&mut rng, at.ns), scattering };
+            let lobes = Lobes { wo: viewer(&mut rng, at.ns), scattering, alone: true };
             if !light.prepare(&at, &lobes, &mut guide) {
                 continue;
             }
             let n = 20_000;
-            let mut counts = vec![0.0; guide.weights.len()];
+            let map = table.cells();
+            let mut counts = vec![0.0; map + light.discs.len()];
             for _ in 0..n {
-                let Some(choice) = table.sample(&guide, extend_unit(rng.vec2().to_array())) else { continue };
-                counts[table.cell_of(&choice)] += 1.0;
+                let cell = match table.sample(&guide, extend_unit(rng.vec2().to_array())) {
+                    Some(Choice::Map { at, cell }) => {
+                        assert_eq!(table.cell_of(at), cell);
+                        cell
+                    }
+                    Some(Choice::Disc { disc, .. }) => map + disc,
+                    None => panic!("{what}: no cell"),
+                };
+                counts[cell] += 1.0;
             }
-            let total = guide.total();
-            let expected: Vec<f64> =
-                guide.weights.iter().map(|w| f64::from(n) * f64::from(*w) / total).collect();
+            // That of a disc is the probability of a cell after those of the map.
+            let expected: Vec<f64> = (0..counts.len()).map(|i| f64::from(n) * table.pmf(&guide, i)).collect();
             chi_square_counts(&format!("{what} {scattering:?}"), tests, &counts, &expected);
             for _ in 0..200 {
                 let u = rng.vec2().to_array();
@@ -92,7 +100,7 @@ fn variance(light: &SkyLight, at: &Receiver, wo: Vec3, material: &dyn Fn(Vec3) -
         let u = rng.vec2().to_array();
         let s = match guided {
             Some(g) => {
-                g.prepare(at, &Lobes { wo, scattering }, &mut guide);
+                g.prepare(at, &Lobes { wo, scattering, alone: true }, &mut guide);
                 g.sample(at, &guide, u)
             }
             None => light.sample_li(at, u),

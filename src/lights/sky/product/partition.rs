@@ -1,0 +1,358 @@
+//! The charts of a sky cut into about a thousand cells, small where the light varies.
+//!
+//! Within a cell directions are drawn evenly over the chart, so what varies there is noise: cells are halved, the one that
+//! adds most to the variance first, until there are as many as a table holds.
+
+use super::super::plan::Level;
+use crate::base::skybox::{ChartGrid, ChartPoint, Skybox};
+use glam::DVec3;
+use rayon::prelude::*;
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+
+/// Cells to begin with, along a chart's sides: of one chart that is the whole sphere, and of each of several.
+const SPHERE_BLOCKS: [u32; 2] = [32, 16];
+const FACE_BLOCKS: [u32; 2] = [8, 8];
+/// What a steradian of a cell adds to its relative variance: the mean over surfaces, by the light that they get, of how
+/// the cosine varies within a small square, s^2 tan^2 / 12.
+const OF_ANGLE: f64 = 1.0 / 6.0;
+
+/// A rectangle of cells of the finest grid.
+#[derive(Debug, Clone, Copy)]
+struct Rect {
+    chart: u32,
+    x: [u32; 2],
+    y: [u32; 2],
+}
+
+/// A rectangle's halves, or its number among the cells.
+#[derive(Debug, Clone, Copy)]
+enum Node {
+    Cell(u32),
+    /// The first of the second half's columns, and the number of the first half's node; the second's follows.
+    X(u32, u32),
+    /// The same of rows.
+    Y(u32, u32),
+}
+
+/// See the module.
+pub(in super::super) struct Partition {
+    grid: ChartGrid,
+    across: usize,
+    down: usize,
+    /// The first blocks, row by row, chart by chart, then halves.
+    nodes: Vec<Node>,
+    cells: Vec<Rect>,
+    /// The same for those who draw from them.
+    places: Vec<Place>,
+}
+
+/// A cell as those who draw from it need it.
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct Place {
+    chart: u32,
+    /// Least u and v.
+    from: [f64; 2],
+    /// How much u and v span.
+    size: [f64; 2],
+    /// What part of a side directions keep off the border: more than the rounding to f32 can carry them back over.
+    rim: [f64; 2],
+    /// One over the area.
+    pub density: f64,
+}
+
+impl Place {
+    fn new(rect: &Rect, grid: &ChartGrid) -> Self {
+        let (w, h) = (f64::from(grid.width), f64::from(grid.height));
+        let span = [rect.x, rect.y].map(|[a, b]| f64::from(b - a));
+        Place {
+            chart: rect.chart,
+            from: [f64::from(rect.x[0]) / w, f64::from(rect.y[0]) / h],
+            size: [span[0] / w, span[1] / h],
+            rim: [w * 1.5e-7 / span[0], h * 1.5e-7 / span[1]],
+            density: w * h / (span[0] * span[1]),
+        }
+    }
+
+    /// The chart's point at these parts of the sides, in [0, 1].
+    #[inline(always)]
+    pub fn point(&self, part: [f64; 2]) -> ChartPoint {
+        let at = |k: usize| self.from[k] + self.size[k] * part[k].clamp(self.rim[k], 1.0 - self.rim[k]);
+        ChartPoint { chart: self.chart, u: at(0), v: at(1) }
+    }
+}
+
+/// What a rectangle brings: luminance, the sum of its squares over the grid's cells, solid angle.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    flux: f64,
+    squares: f64,
+    angle: f64,
+}
+
+/// Waits to be halved.
+struct Candidate {
+    gain: f64,
+    node: u32,
+    rect: Rect,
+}
+
+impl Ord for Candidate {
+    fn cmp(&self, o: &Self) -> Ordering {
+        self.gain.total_cmp(&o.gain).then(o.node.cmp(&self.node))
+    }
+}
+
+impl PartialOrd for Candidate {
+    fn partial_cmp(&self, o: &Self) -> Option<Ordering> {
+        Some(self.cmp(o))
+    }
+}
+
+impl PartialEq for Candidate {
+    fn eq(&self, o: &Self) -> bool {
+        self.cmp(o) == Ordering::Equal
+    }
+}
+
+impl Eq for Candidate {}
+
+/// The first of the cells `0..n` that are the part `i` of `parts`.
+fn edge(i: usize, n: u32, parts: usize) -> u32 {
+    (i as u64 * u64::from(n) / parts as u64) as u32
+}
+
+/// The part of `parts` that cell `x` of `n` lies in.
+fn part_of(x: u32, n: u32, parts: usize) -> usize {
+    let guess = (u64::from(x) * parts as u64 / u64::from(n)) as usize;
+    if guess + 1 < parts && edge(guess + 1, n, parts) <= x { guess + 1 } else { guess }
+}
+
+impl Sums {
+    fn add(&mut self, o: &Sums) {
+        self.flux += o.flux;
+        self.squares += o.squares;
+        self.angle += o.angle;
+    }
+
+    /// What a rectangle of `n` cells adds to the variance of one sample, up to a factor that all share: n sum f^2 / F is
+    /// the second moment of light that arrives if it is chosen in proportion to its flux F, and F the square of the mean.
+    fn variance(&self, n: f64) -> f64 {
+        match self.flux > 0.0 {
+            true => (n * self.squares / self.flux - self.flux).max(0.0) + OF_ANGLE * self.angle * self.flux,
+            false => 0.0,
+        }
+    }
+}
+
+impl Rect {
+    fn cells(&self) -> f64 {
+        f64::from(self.x[1] - self.x[0]) * f64::from(self.y[1] - self.y[0])
+    }
+
+    fn middle(&self) -> [u32; 2] {
+        [self.x, self.y].map(|[a, b]| a + (b - a) / 2)
+    }
+
+    /// Sums over the four quarters about the middle, row by row; some are empty where a side is one cell.
+    fn quarters(&self, level: &Level) -> [Sums; 4] {
+        let ChartGrid { width, height, .. } = level.grid();
+        let [mx, my] = self.middle();
+        let mut sums = [Sums::default(); 4];
+        for y in self.y[0]..self.y[1] {
+            let row = (self.chart * height + y) as usize * width as usize;
+            for (k, [a, b]) in [[self.x[0], mx], [mx, self.x[1]]].into_iter().enumerate() {
+                let to = &mut sums[2 * usize::from(y >= my) + k];
+                for i in row + a as usize..row + b as usize {
+                    let flux = level.integral(i);
+                    to.add(&Sums { flux, squares: flux * flux, angle: level.solid_angle(i) });
+                }
+            }
+        }
+        sums
+    }
+
+    /// The halves that leave less variance, and how much each leaves; None if it is one cell.
+    fn halve(&self, level: &Level) -> Option<Halves> {
+        let quarters = self.quarters(level);
+        let [mx, my] = self.middle();
+        let whole = |a: usize, b: usize| {
+            let mut sums = quarters[a];
+            sums.add(&quarters[b]);
+            sums
+        };
+        let candidate = |along_x: bool| {
+            let (ends, at, sums) = match along_x {
+                true => (self.x, mx, [whole(0, 2), whole(1, 3)]),
+                false => (self.y, my, [whole(0, 1), whole(2, 3)]),
+            };
+            let part = |k: usize| match along_x {
+                true => Rect { x: if k == 0 { [ends[0], at] } else { [at, ends[1]] }, ..*self },
+                false => Rect { y: if k == 0 { [ends[0], at] } else { [at, ends[1]] }, ..*self },
+            };
+            let parts = [part(0), part(1)];
+            let variances = [0, 1].map(|k| sums[k].variance(parts[k].cells()));
+            (at > ends[0]).then_some(Halves { along_x, at, parts, variances })
+        };
+        let left = |h: &Halves| h.variances[0] + h.variances[1];
+        let both = [candidate(true), candidate(false)];
+        both.into_iter().flatten().min_by(|a, b| left(a).total_cmp(&left(b)))
+    }
+
+    /// The sums over all of it.
+    fn sums(&self, level: &Level) -> Sums {
+        let mut all = Sums::default();
+        self.quarters(level).iter().for_each(|q| all.add(q));
+        all
+    }
+
+    /// The chart's point at these parts of the sides, in [0, 1].
+    fn point(&self, grid: &ChartGrid, part: [f64; 2]) -> ChartPoint {
+        let at = |[a, b]: [u32; 2], n: u32, part: f64| {
+            (f64::from(a) + part * (f64::from(b) - f64::from(a))) / f64::from(n)
+        };
+        ChartPoint {
+            chart: self.chart,
+            u: at(self.x, grid.width, part[0]),
+            v: at(self.y, grid.height, part[1]),
+        }
+    }
+}
+
+struct Halves {
+    along_x: bool,
+    at: u32,
+    parts: [Rect; 2],
+    variances: [f64; 2],
+}
+
+/// What is known of a cell.
+pub(in super::super) struct CellLight {
+    /// Integral of luminance.
+    pub flux: f64,
+    /// Solid angle.
+    pub angle: f64,
+    /// Unit direction to the middle of its light.
+    pub middle: DVec3,
+    /// Sine, at least, of the largest angle between it and a direction of the cell.
+    pub reach: f32,
+    /// From the cell's centre to the middles of its sides of larger u and of larger v.
+    pub sides: [DVec3; 2],
+}
+
+impl Partition {
+    /// Into `most` cells, or as many as it takes until each is one of the grid's.
+    pub fn new(level: &Level, most: usize) -> Self {
+        let grid = level.grid();
+        let [across, down] = if grid.count == 1 { SPHERE_BLOCKS } else { FACE_BLOCKS };
+        let (across, down) = (across.min(grid.width) as usize, down.min(grid.height) as usize);
+        let blocks = grid.count as usize * across * down;
+        let block = |i: usize| {
+            let (row, column) = (i / across, i % across);
+            let (chart, y) = (row / down, row % down);
+            let span = |i: usize, n: u32, parts: usize| [edge(i, n, parts), edge(i + 1, n, parts)];
+            Rect { chart: chart as u32, x: span(column, grid.width, across), y: span(y, grid.height, down) }
+        };
+        let rects: Vec<Rect> = (0..blocks).map(block).collect();
+        let gains: Vec<f64> = rects.par_iter().map(|r| r.sums(level).variance(r.cells())).collect();
+        let mut heap: BinaryHeap<Candidate> = (0..)
+            .zip(rects.iter().zip(&gains))
+            .map(|(node, (&rect, &gain))| Candidate { gain, node, rect })
+            .collect();
+        let mut all = rects;
+        let mut nodes = vec![Node::Cell(0); blocks];
+        let mut count = blocks;
+        while count < most {
+            let Some(c) = heap.pop().filter(|c| c.gain > 0.0) else { break };
+            let Some(halves) = c.rect.halve(level) else { continue };
+            let first = nodes.len() as u32;
+            nodes[c.node as usize] =
+                if halves.along_x { Node::X(halves.at, first) } else { Node::Y(halves.at, first) };
+            for (k, (rect, gain)) in (0..).zip(halves.parts.into_iter().zip(halves.variances)) {
+                nodes.push(Node::Cell(0));
+                all.push(rect);
+                heap.push(Candidate { gain, node: first + k, rect });
+            }
+            count += 1;
+        }
+        let mut cells = Vec::with_capacity(count);
+        for (node, rect) in nodes.iter_mut().zip(all) {
+            if let Node::Cell(number) = node {
+                *number = cells.len() as u32;
+                cells.push(rect);
+            }
+        }
+        let places = cells.iter().map(|r| Place::new(r, &grid)).collect();
+        Partition { grid, across, down, nodes, cells, places }
+    }
+
+    /// All cells.
+    pub fn places(&self) -> &[Place] {
+        &self.places
+    }
+
+    /// The number of the cell that a point lies in.
+    #[inline]
+    pub fn find(&self, at: ChartPoint) -> usize {
+        let cell = |u: f64, n: u32| ((u * f64::from(n)) as u32).min(n - 1);
+        let (x, y) = (cell(at.u, self.grid.width), cell(at.v, self.grid.height));
+        let row = at.chart as usize * self.down + part_of(y, self.grid.height, self.down);
+        let mut node = row * self.across + part_of(x, self.grid.width, self.across);
+        loop {
+            node = match self.nodes[node] {
+                Node::Cell(number) => return number as usize,
+                Node::X(at, first) => first as usize + usize::from(x >= at),
+                Node::Y(at, first) => first as usize + usize::from(y >= at),
+            };
+        }
+    }
+
+    /// What is known of each cell.
+    pub fn lights(&self, sky: &dyn Skybox, level: &Level) -> Vec<CellLight> {
+        self.cells.par_iter().map(|r| self.light(sky, level, r)).collect()
+    }
+
+    fn light(&self, sky: &dyn Skybox, level: &Level, rect: &Rect) -> CellLight {
+        const SIDE: u32 = 4;
+        let part = |i: u32, [a, b]: [u32; 2]| (i - a) * SIDE / (b - a);
+        let mut sums = [0.0; (SIDE * SIDE) as usize];
+        for y in rect.y[0]..rect.y[1] {
+            let row = (rect.chart * self.grid.height + y) as usize * self.grid.width as usize;
+            for x in rect.x[0]..rect.x[1] {
+                let of = part(y, rect.y) * SIDE + part(x, rect.x);
+                sums[of as usize] += level.integral(row + x as usize);
+            }
+        }
+        let lattice = |k: u32, n: u32, first: f64| {
+            let at = |k: u32| (f64::from(k) + first) / f64::from(SIDE);
+            sky.direction(rect.point(&self.grid, [at(k % n), at(k / n)]))
+        };
+        let flux: f64 = sums.iter().sum();
+        let light: DVec3 = (0..)
+            .zip(&sums)
+            .map(|(k, s)| if *s > 0.0 { lattice(k, SIDE, 0.5) * *s } else { DVec3::ZERO })
+            .sum();
+        let borders = || (0..(SIDE + 1) * (SIDE + 1)).map(|k| lattice(k, SIDE + 1, 0.0));
+        let middle = (light / flux.max(f64::MIN_POSITIVE))
+            .try_normalize()
+            .or_else(|| borders().sum::<DVec3>().try_normalize())
+            .unwrap_or(DVec3::Y);
+        // Chords are longer than sines; the margin is for what lies between the points.
+        let reach = borders().map(|p| (p - middle).length()).fold(0.0, f64::max);
+        let side = |part: [f64; 2]| {
+            sky.direction(rect.point(&self.grid, part)) - sky.direction(rect.point(&self.grid, [0.5, 0.5]))
+        };
+        CellLight {
+            flux,
+            angle: rect.sums(level).angle,
+            middle,
+            reach: (1.02 * reach) as f32,
+            sides: [side([1.0, 0.5]), side([0.5, 1.0])],
+        }
+    }
+
+    /// Bytes held.
+    pub fn memory(&self) -> u64 {
+        (size_of_val(&*self.nodes) + size_of_val(&*self.cells) + size_of_val(&*self.places)) as u64
+    }
+}

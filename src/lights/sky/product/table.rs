@@ -1,0 +1,238 @@
+//! Probabilities of about a thousand cells, laid out as a square that numbers are mapped to.
+//!
+//! Rows of equal probability, exactly, so that stratified numbers stay stratified: where a cell has more than what is left of
+//! a row, the next rows have the rest of it. In a row cells are found without a branch.
+
+/// Rows: few enough that cells are as small across as along, and a power of two, as points are even for.
+const ROWS: usize = 16;
+/// What probabilities within a row are multiples of one over.
+const UNITS: i16 = i16::MAX;
+/// Cells of a row are counted in eights: what vector registers hold.
+const LANES: usize = 8;
+
+/// See the module. Probabilities are exact multiples of their units, and whatever has weight has at least one.
+pub(super) struct Table {
+    /// Where rows begin in `ends` and `cells`.
+    starts: [u16; ROWS + 1],
+    /// Running sums of units over the entries of a row; padded with all of them.
+    ends: Box<[i16]>,
+    /// The cells of the entries, below the bits that tell how they lie.
+    cells: Box<[u16]>,
+    /// By cell.
+    pmf: Box<[f32]>,
+    /// Sum of the weights.
+    pub total: f32,
+    /// Sum of what the weights would be if nothing else found the light.
+    pub whole: f32,
+}
+
+/// Where a cell lies in a plane in which neighbours on the sphere are close, and how.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Place {
+    pub at: [f32; 2],
+    /// By what numbers run the plane's ways through it: [`SWAPPED`] if its first side runs along the plane's second axis,
+    /// [`FIRST_BACK`] and [`SECOND_BACK`] if its sides run against the axes that they lie along.
+    pub lie: u16,
+}
+
+pub(super) const SWAPPED: u16 = 1 << 13;
+pub(super) const FIRST_BACK: u16 = 1 << 14;
+pub(super) const SECOND_BACK: u16 = 1 << 15;
+const LIE: u16 = SWAPPED | FIRST_BACK | SECOND_BACK;
+
+/// What was found.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Found {
+    pub cell: usize,
+    /// What is left of both numbers, in [0, 1], for the cell's sides.
+    pub u: [f64; 2],
+}
+
+/// A cell, or as much of it as there is in a row.
+struct Piece {
+    cell: u16,
+    weight: f64,
+}
+
+/// Cuts the cells, in this order, into rows of equal weight.
+fn rows(order: &[u16], weights: &[f32]) -> Option<[Vec<Piece>; ROWS]> {
+    let total: f64 = order.iter().map(|&i| f64::from(weights[i as usize])).sum();
+    if !(total > 0.0 && total.is_finite()) {
+        return None;
+    }
+    let size = total / ROWS as f64;
+    let row_of = |at: f64| ((at / size) as usize).min(ROWS - 1);
+    let mut rows: [Vec<Piece>; ROWS] = Default::default();
+    let mut from = 0.0;
+    for &cell in order {
+        let to = from + f64::from(weights[cell as usize]);
+        // What is lost beside the others' sum is not without weight.
+        if to <= from {
+            rows[row_of(from)].push(Piece { cell, weight: size * f64::EPSILON });
+        }
+        for row in row_of(from)..=row_of(to) {
+            let end = if row + 1 == ROWS { f64::INFINITY } else { (row + 1) as f64 * size };
+            let weight = to.min(end) - from.max(row as f64 * size);
+            if weight > 0.0 {
+                rows[row].push(Piece { cell, weight });
+            }
+        }
+        from = to;
+    }
+    Some(rows)
+}
+
+/// Running sums of the pieces in whole units.
+fn quantise(pieces: &[Piece], mut put: impl FnMut(u16, i16)) {
+    let total: f64 = pieces.iter().map(|p| p.weight).sum();
+    let (mut sum, mut last) = (0.0, 0);
+    for (after, p) in (0..pieces.len() as i16).rev().zip(pieces) {
+        sum += p.weight;
+        let ideal = (sum / total * f64::from(UNITS)).round() as i16;
+        last = if after == 0 { UNITS } else { ideal.clamp(last + 1, UNITS - after) };
+        put(p.cell, last);
+    }
+}
+
+impl Table {
+    /// Of cells, at most 8192, with weights that are not negative. None if all weights are zero.
+    pub fn new(weights: &[f32], places: &[Place]) -> Option<Box<Self>> {
+        let along = |axis: usize| {
+            move |a: &u16, b: &u16| {
+                let place = |i: &u16| places[*i as usize].at[axis];
+                place(a).total_cmp(&place(b)).then(a.cmp(b))
+            }
+        };
+        let mut order: Vec<u16> = (0..weights.len() as u16).filter(|i| weights[*i as usize] > 0.0).collect();
+        order.sort_unstable_by(along(1));
+        let mut rows = rows(&order, weights)?;
+        let mut starts = [0; ROWS + 1];
+        let (mut ends, mut cells, mut units) = (Vec::new(), Vec::new(), vec![0u32; weights.len()]);
+        for (start, row) in starts[1..].iter_mut().zip(&mut rows) {
+            row.sort_unstable_by(|a, b| along(0)(&a.cell, &b.cell));
+            let mut last = 0;
+            quantise(row, |cell, end| {
+                ends.push(end);
+                cells.push(cell | places[cell as usize].lie);
+                units[cell as usize] += (end - last) as u32;
+                last = end;
+            });
+            let padded = ends.len().next_multiple_of(LANES);
+            ends.resize(padded, UNITS);
+            cells.resize(padded, 0);
+            *start = padded as u16;
+        }
+        let total = order.iter().map(|&i| f64::from(weights[i as usize])).sum::<f64>() as f32;
+        let unit = 1.0 / (f64::from(UNITS) * ROWS as f64);
+        Some(Box::new(Table {
+            starts,
+            ends: ends.into(),
+            cells: cells.into(),
+            pmf: units.iter().map(|u| (f64::from(*u) * unit) as f32).collect(),
+            total,
+            whole: total,
+        }))
+    }
+
+    /// The cell for two numbers in [0, 1): the second finds a row, the first an entry of it.
+    #[inline]
+    pub fn find(&self, u: [f64; 2]) -> Found {
+        // Below the last end, rounding and all.
+        let [x, y] = u.map(|v| v.clamp(0.0, 1.0 - 8.0 * f64::EPSILON));
+        let y = y * ROWS as f64;
+        let row = (y as usize).min(ROWS - 1);
+        let (start, end) = (self.starts[row] as usize, self.starts[row + 1] as usize);
+        let x = x * f64::from(UNITS);
+        let whole = x as i16;
+        let mut counts = [0i16; LANES];
+        for eight in self.ends[start..end].chunks_exact(LANES) {
+            for (count, e) in counts.iter_mut().zip(eight) {
+                *count += i16::from(*e <= whole);
+            }
+        }
+        let before = counts.iter().sum::<i16>() as usize;
+        let entry = start + before;
+        let from = if before > 0 { self.ends[entry - 1] } else { 0 };
+        let x = (x - f64::from(from)) / f64::from(self.ends[entry] - from);
+        let y = y - row as f64;
+        let cell = self.cells[entry];
+        let [a, b] = if cell & SWAPPED == 0 { [x, y] } else { [y, x] };
+        let run = |u: f64, back: u16| if cell & back == 0 { u } else { 1.0 - u };
+        Found { cell: (cell & !LIE) as usize, u: [run(a, FIRST_BACK), run(b, SECOND_BACK)] }
+    }
+
+    /// The probability of a cell.
+    #[inline]
+    pub fn pmf(&self, cell: usize) -> f64 {
+        f64::from(self.pmf[cell])
+    }
+
+    /// Bytes held.
+    pub fn memory(&self) -> usize {
+        size_of_val(self) + size_of_val(&*self.ends) + size_of_val(&*self.cells) + size_of_val(&*self.pmf)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::TestRng;
+
+    const ONE_MINUS: f64 = 1.0 - f64::EPSILON / 2.0;
+
+    #[test]
+    fn numbers_are_shared_out_as_the_probabilities_say() {
+        let mut rng = TestRng::new(5);
+        for n in [1usize, 2, 31, 32, 33, 700, 1024] {
+            // Of all magnitudes, some zero.
+            let weights: Vec<f32> =
+                (0..n).map(|i| if i % 5 == 3 { 0.0 } else { 10f32.powf(8.0 * rng.vec2().x - 4.0) }).collect();
+            let places: Vec<Place> =
+                (0..n as u16).map(|i| Place { at: rng.vec2().to_array(), lie: (i % 8) * SWAPPED }).collect();
+            let table = Table::new(&weights, &places).unwrap();
+            let sum: f64 = (0..n).map(|i| table.pmf(i)).sum();
+            // Each an f32.
+            assert!((sum - 1.0).abs() < 1e-6, "{n}: {sum}");
+            let total: f64 = weights.iter().map(|w| f64::from(*w)).sum();
+            let unit = 1.0 / (ROWS as f64 * f64::from(UNITS));
+            for (i, w) in weights.iter().enumerate() {
+                let (p, w) = (table.pmf(i), f64::from(*w));
+                assert_eq!(p > 0.0, w > 0.0, "{n} {i}");
+                // What the least of others are given is taken from it, in each row that it is in.
+                let slack = unit * n as f64 * ROWS as f64;
+                assert!((p - w / total).abs() <= slack, "{n} {i}: {p} {}", w / total);
+            }
+            // Over a fine grid of numbers each cell is found as often as its probability says: exactly so along x, where a
+            // point stands for a unit.
+            let mut counts = vec![0u32; n];
+            for k in 0..ROWS as u32 * UNITS as u32 {
+                let (row, x) = (k / UNITS as u32, k % UNITS as u32);
+                let u = [(f64::from(x) + 0.5) / f64::from(UNITS), (f64::from(row) + 0.5) / ROWS as f64];
+                let found = table.find(u);
+                assert!(found.u.iter().all(|u| (0.0..=1.0).contains(u)), "{found:?}");
+                counts[found.cell] += 1;
+            }
+            for (i, c) in counts.iter().enumerate() {
+                assert!((f64::from(*c) * unit - table.pmf(i)).abs() <= 1e-7 * table.pmf(i), "{n} {i}");
+            }
+            for corner in [[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [1.0, 1.0]] {
+                assert!(table.pmf(table.find(corner.map(|c: f64| c.min(ONE_MINUS))).cell) > 0.0);
+            }
+        }
+        assert!(Table::new(&[], &[]).is_none() && Table::new(&[0.0; 40], &[Place::default(); 40]).is_none());
+    }
+
+    #[test]
+    fn half_of_all_is_half_of_the_rows() {
+        let mut weights = vec![1.0; 64];
+        weights[20] = 63.0;
+        let places: Vec<Place> =
+            (0..64).map(|i| Place { at: [(i % 8) as f32, (i / 8) as f32], lie: 0 }).collect();
+        let table = Table::new(&weights, &places).unwrap();
+        assert!((table.pmf(20) - 0.5).abs() < 1e-3);
+        // Of 32 numbers, one in each of 32 strips, 16 are its own but for the two rows that it shares.
+        let of = |k: u32| table.find([0.5, (f64::from(k) + 0.5) / 32.0]).cell == 20;
+        let hits = (0..32).filter(|k| of(*k)).count();
+        assert!((14..=18).contains(&hits), "{hits}");
+    }
+}
