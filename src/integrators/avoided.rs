@@ -11,7 +11,8 @@ pub struct Avoided {
     pub points: u64,
     /// Rays that such a path tracer would trace from them.
     pub candidates: u64,
-    /// Shadow rays: the light sample is black, or the surface scatters none of it to the viewer.
+    /// Shadow rays: the light sample is black, hardly anything is left for it beside what scattered rays find, or the surface
+    /// scatters none of it to the viewer.
     pub dark_samples: u64,
     /// Shadow rays: light is found by scattered rays alone, as on mirrors or under skies that are left to them.
     pub scattered_alone: u64,
