@@ -37,6 +37,8 @@ const SEED: u64 = 0x7069_6c6f_7400_0000;
 /// Part of the squared mean that is added to a pixel's own, as in relMSE: what a dark pixel counts for.
 const EPSILON: f64 = 0.01;
 
+/// What a camera ray costs that meets nothing, in the same.
+const BARE_COST: f64 = 0.12;
 /// How steeply squared errors fall with the number of samples: the exponent at which cost counts against variance.
 const SLOPE: f64 = 1.2;
 
@@ -56,7 +58,7 @@ const TAME: f32 = 16.0;
 const EVEN: Strategy = Strategy::Light(8);
 const FACETS: Strategy = Strategy::Both(4);
 /// How much better than the first candidate another has to look: so much is noise.
-const MARGIN: f64 = 0.85;
+const MARGIN: f64 = 0.7;
 
 /// What is tried for a material, the most likely first. Scattered rays alone miss what is small and bright. So do light samples on narrow lobes:
 /// within a coarse cell with a sun, the rest of the cell is hardly ever drawn, and a lobe may lie just there.
@@ -82,13 +84,15 @@ struct Class<'a> {
 /// Numbers of the classes of all objects and slots, and the classes.
 struct Classes<'a> {
     list: Vec<Class<'a>>,
+    /// Pixels in whose middle there is no surface.
+    bare: Vec<[u32; 2]>,
     /// By object, then slot.
     of: Vec<Vec<usize>>,
 }
 
 impl<'a> Classes<'a> {
     fn new(scene: &'a Scene) -> Self {
-        let mut all = Classes { list: Vec::new(), of: Vec::new() };
+        let mut all = Classes { list: Vec::new(), bare: Vec::new(), of: Vec::new() };
         let mut by_address = std::collections::HashMap::new();
         for object in &scene.objects {
             let slots = object.materials.iter().map(|material| {
@@ -126,6 +130,8 @@ pub(super) fn choose(tracer: &PathTracer, scene: &Scene, plan: &PilotPlan) -> Op
         rays.camera += scout(scene, plan, scouts, &mut classes);
     }
     let most = (affordable / classes.list.len().max(1)).min(MOST);
+    let bare = Bare::new(tracer, scene, plan, &mut classes.bare, affordable.min(MOST));
+    rays.add(&bare.rays);
     for class in classes.list.iter_mut().filter(|c| !c.material.is_delta() && !c.material.is_black()) {
         if class.pixels.len().min(most) < LEAST {
             class.strategy = if class.is_even { EVEN } else { FACETS };
@@ -136,10 +142,11 @@ pub(super) fn choose(tracer: &PathTracer, scene: &Scene, plan: &PilotPlan) -> Op
             class.strategy = *only;
             continue;
         }
+        let area = class.pixels.len() as f64;
         thin(&mut class.pixels, most);
         let run = |s: &Strategy| Trial::run(tracer, scene, plan, &class.pixels, *s);
         let trials: Vec<Trial> = candidates.iter().map(run).collect();
-        class.strategy = best(&trials);
+        class.strategy = best(&trials, area, &bare);
         trials.iter().for_each(|t| rays.add(&t.rays));
     }
     let list = &classes.list;
@@ -175,7 +182,10 @@ fn scout(scene: &Scene, plan: &PilotPlan, scouts: usize, classes: &mut Classes) 
     let mut hits = HitBatch::default();
     scene.kernel.intersect_batch(&rays, &mut hits, Coherence::Coherent);
     for (i, pixel) in pixels.iter().enumerate() {
-        let Some(hit) = hits.get(i) else { continue };
+        let Some(hit) = hits.get(i) else {
+            classes.bare.push(*pixel);
+            continue;
+        };
         let v = scene.vertex(&rays.get(i), hit, 0.0);
         let mut prepared = Prepared::default();
         let class = classes.of_vertex(&v);
@@ -186,6 +196,37 @@ fn scout(scene: &Scene, plan: &PilotPlan, scouts: usize, classes: &mut Classes) 
         class.pixels.push(*pixel);
     }
     pixels.len() as u64
+}
+
+/// The pixels without a surface, whose noise is that of the sky's picture and of outlines: only more camera rays lower it,
+/// and each that has to carry many light samples elsewhere is dear.
+struct Bare {
+    /// Sum over the lattice's pixels of their squared relative errors.
+    error: f64,
+    /// The same of their costs.
+    cost: f64,
+    /// Rays that were spent.
+    rays: RayCounts,
+}
+
+impl Bare {
+    fn new(
+        tracer: &PathTracer,
+        scene: &Scene,
+        plan: &PilotPlan,
+        pixels: &mut Vec<[u32; 2]>,
+        most: usize,
+    ) -> Self {
+        let area = pixels.len() as f64;
+        if pixels.is_empty() || most < LEAST {
+            return Bare { error: 0.0, cost: 0.0, rays: RayCounts::default() };
+        }
+        thin(pixels, most);
+        let trial = Trial::run(tracer, scene, plan, pixels, EVEN);
+        let means = means(std::slice::from_ref(&trial));
+        let each = 2.0 * f64::from(SAMPLES);
+        Bare { error: area * trial.error(&means), cost: area * each * BARE_COST, rays: trial.rays }
+    }
 }
 
 /// What a strategy came to.
@@ -214,6 +255,18 @@ impl Trial {
             trial.rays.add(&rays);
         }
         trial
+    }
+
+    /// The mean over pixels of their squared errors, relative to their `means` as in relMSE.
+    fn error(&self, means: &[Rgb]) -> f64 {
+        let pixels = means.len().max(1) as f64;
+        let mean = means.iter().map(|c| f64::from(c.luminance())).sum::<f64>() / pixels;
+        let squares = self.halves.iter().zip(means).map(|([a, b], m)| {
+            let d = f64::from((*a - *b).luminance());
+            let scale = f64::from(m.luminance()).powi(2) + EPSILON * mean * mean;
+            if d == 0.0 { 0.0 } else { d * d / scale }
+        });
+        squares.sum::<f64>() / pixels
     }
 
     /// Counted, in rays of a shadow's cost.
@@ -260,24 +313,22 @@ fn trace(
     (halves.chunks_exact(2).map(|h| [h[0], h[1]]).collect(), work.counts)
 }
 
-/// The strategy of the least variance times cost. Squared differences of halves are weighed as relative errors are, by
-/// a mean over all trials, so that no trial is favoured by its own noise.
-fn best(trials: &[Trial]) -> Strategy {
+/// The means of all trials, by pixel.
+fn means(trials: &[Trial]) -> Vec<Rgb> {
     let pixels = trials.first().map_or(0, |t| t.halves.len());
-    let means: Vec<Rgb> = (0..pixels)
-        .map(|i| {
-            let sum = trials.iter().fold(Rgb::BLACK, |s, t| s + t.halves[i][0] + t.halves[i][1]);
-            sum / (2 * trials.len()) as f32
-        })
-        .collect();
-    let mean = means.iter().map(|c| f64::from(c.luminance())).sum::<f64>() / pixels.max(1) as f64;
+    let sum = |i: usize| trials.iter().fold(Rgb::BLACK, |s, t| s + t.halves[i][0] + t.halves[i][1]);
+    (0..pixels).map(|i| sum(i) / (2 * trials.len()) as f32).collect()
+}
+
+/// The strategy with which a picture of `area` such pixels and the bare ones comes to the same error with the fewest rays.
+/// Squared differences of halves are weighed as relative errors are, by a mean over all trials, so that no trial is favoured
+/// by its own noise.
+fn best(trials: &[Trial], area: f64, bare: &Bare) -> Strategy {
+    let means = means(trials);
+    let pixels = means.len().max(1) as f64;
     let score = |t: &Trial| {
-        let squares = t.halves.iter().zip(&means).map(|([a, b], m)| {
-            let d = f64::from((*a - *b).luminance());
-            let scale = f64::from(m.luminance()).powi(2) + EPSILON * mean * mean;
-            if d == 0.0 { 0.0 } else { d * d / scale }
-        });
-        squares.sum::<f64>() * t.cost().powf(SLOPE)
+        let error = area * t.error(&means) + bare.error;
+        error * (area * t.cost() / pixels + bare.cost).powf(SLOPE)
     };
     let scores = (0..).zip(trials).map(|(i, t)| (score(t) * if i == 0 { MARGIN } else { 1.0 }, t));
     let found = scores.min_by(|a, b| a.0.total_cmp(&b.0)).map(|s| s.1);
