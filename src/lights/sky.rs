@@ -45,7 +45,7 @@ enum MapSampler {
         cells: ChartDistribution,
     },
     /// Discs are among its cells.
-    Product(ProductTable),
+    Product(Box<ProductTable>),
 }
 
 impl SkyLight {
@@ -93,9 +93,9 @@ impl SkyLight {
         let Some(plan) = plan else {
             let discs = place(&vec![0.0; sky.discs().len()]);
             let table = ProductTable::new(&*sky, &levels[0], &discs, turn, intensity);
-            let map_total = table.as_ref().map_or(0.0, ProductTable::map_flux);
+            let map_total = table.as_ref().map_or(0.0, |t| t.map_flux());
             let total = (map_total + disc_total) * f64::from(intensity);
-            let map = table.map_or(MapSampler::None, MapSampler::Product);
+            let map = table.map_or(MapSampler::None, |t| MapSampler::Product(Box::new(t)));
             return Ok(SkyLight { sky, intensity, turn, discs, map, map_share: 0.0, total });
         };
         let discs = place(&plan.disc_shares);

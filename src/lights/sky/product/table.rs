@@ -70,11 +70,12 @@ fn rows(order: &[u16], weights: &[f32]) -> Option<[Vec<Piece>; ROWS]> {
         if to <= from {
             rows[row_of(from)].push(Piece { cell, weight: size * f64::EPSILON });
         }
-        for row in row_of(from)..=row_of(to) {
+        let (first, last) = (row_of(from), row_of(to));
+        for (row, pieces) in (first..).zip(&mut rows[first..=last]) {
             let end = if row + 1 == ROWS { f64::INFINITY } else { (row + 1) as f64 * size };
             let weight = to.min(end) - from.max(row as f64 * size);
             if weight > 0.0 {
-                rows[row].push(Piece { cell, weight });
+                pieces.push(Piece { cell, weight });
             }
         }
         from = to;
