@@ -256,7 +256,9 @@ fn a_sun_of_one_texel_is_never_lost() {
         assert!(hits > least, "{sampling:?}: {hits}");
         // Its own texel is a cell: the bilinear filter leaves little variance.
         let (e, error) = irradiance(&light, toward, 20_000);
-        assert!(error < 0.01 * e, "{e} +- {error}");
+        // Half of the samples have up to twice the variance, where samples are independent of each other, as here.
+        let most = if sampling == SkySampling::Product { 0.01 * f64::sqrt(2.0) } else { 0.01 };
+        assert!(error < most * e, "{sampling:?}: {e} +- {error}");
     }
 }
 
