@@ -82,8 +82,8 @@ pub(super) const STRATEGY: ParamSpec = ParamSpec {
         "auto", "both", "both-2", "both-4", "both-8", "light", "light-2", "light-4", "light-8", "bsdf",
     ]),
     default: Some("auto"),
-    doc: "how a sky that is sampled by products is found: by light samples, scattered rays or both, at the first \
-          surface so many of each; auto tries them out",
+    doc: "how a sky that is sampled by products is found: by light samples, scattered rays or both, so many of \
+          each at the first surface where the sky is the only light (both: where paths end there); auto tries them out",
 };
 
 /// Most lights that are sampled each: a shadow ray for every one of them waits at every surface.

@@ -13,7 +13,8 @@ pub enum Strategy {
     /// [`MOST_SPLIT`]; else one.
     Both(u8),
     /// The light alone: scattered rays that meet it count nothing, and are not traced where they can meet nothing else.
-    /// So many samples of it at the first surface that a path meets, from 1 to [`MOST_SPLIT`]; one at the others.
+    /// So many samples of it at the first surface that a path meets, from 1 to [`MOST_SPLIT`]; one at the others, and where
+    /// there are other lights.
     Light(u8),
     /// The material alone: no shadow ray.
     Bsdf,

@@ -7,7 +7,6 @@ mod product;
 
 use crate::base::directions::{DirectionBatch, Directions};
 use crate::base::light::{Extent, Guide, GuidedLight, Light, LightSample, Lobes, PathEnd, Receiver};
-use crate::base::material::Scattering;
 use crate::base::skybox::{ChartGrid, ChartPoint, Skybox};
 use crate::color::Rgb;
 use crate::error::{Error, Result};
@@ -260,8 +259,8 @@ impl Light for SkyLight {
 
     #[inline]
     fn sample_li(&self, at: &Receiver, u: [f32; 2]) -> Option<LightSample> {
-        if let MapSampler::Product(_) = &self.map {
-            return with_even_guide(self, at, |guide| GuidedLight::sample(self, at, guide, u)).flatten();
+        if let MapSampler::Product(table) = &self.map {
+            return with_plain_guide(table, at, |guide| GuidedLight::sample(self, at, guide, u)).flatten();
         }
         let total = self.in_sight(at);
         if total <= 0.0 {
@@ -295,8 +294,8 @@ impl Light for SkyLight {
         if end.vertex.is_some() || end.wi.dot(at.ng) < 0.0 {
             return 0.0;
         }
-        if let MapSampler::Product(_) = &self.map {
-            return with_even_guide(self, at, |guide| self.pdf(at, guide, end.wi)).unwrap_or(0.0);
+        if let MapSampler::Product(table) = &self.map {
+            return with_plain_guide(table, at, |guide| self.pdf(at, guide, end.wi)).unwrap_or(0.0);
         }
         let map_pdf = if self.map_share > 0.0 { self.map_pdf(at, end.wi) } else { 0.0 };
         self.mixture_pdf(at, end.wi, map_pdf)
@@ -347,12 +346,10 @@ impl Light for SkyLight {
     }
 }
 
-/// What `f` makes of a receiver that scatters evenly, for callers that know nothing of its surface; None where nothing
-/// can arrive.
-fn with_even_guide<T>(light: &SkyLight, at: &Receiver, f: impl FnOnce(&Guide) -> T) -> Option<T> {
+/// What `f` makes of a receiver of whose surface nothing is known; None where nothing can arrive.
+fn with_plain_guide<T>(table: &ProductTable, at: &Receiver, f: impl FnOnce(&Guide) -> T) -> Option<T> {
     let mut guide = Guide::default();
-    let lobes = Lobes { wo: at.ns, scattering: Scattering::EVEN, alone: true };
-    light.prepare(at, &lobes, &mut guide).then(|| f(&guide))
+    table.prepare_plain(at, &mut guide).then(|| f(&guide))
 }
 
 impl GuidedLight for SkyLight {

@@ -40,6 +40,8 @@ use weigh::{About, Columns, Even, Facets};
 const WIDTHS: usize = 12;
 /// Kinds of surfaces.
 const KINDS: usize = 1 + WIDTHS;
+/// The kind of tables for those who know nothing of the surface: all of the light on an even one, its peaks whole.
+const PLAIN: usize = 2 * KINDS;
 /// What counts as a peak: a cell of so many times the mean radiance.
 const PEAK: f64 = 32.0;
 /// Most of a table's weight that peaks may have together. A sun that is hidden leaves all to the other cells, which must
@@ -58,7 +60,8 @@ const MOST_DISCS: usize = 256;
 const ALL_ROUND: usize = octahedron::COUNT;
 const OF_KIND: usize = ALL_ROUND + 1;
 
-/// Tables of one kind, made on demand; None where all is black.
+/// Tables of one kind, made on demand; None where all is black. Each takes up to 9 kB: a picture of one material some ten
+/// megabytes at most, one with facets of all widths in all directions two hundred.
 type Tables = OnceLock<Vec<OnceLock<Option<Box<Table>>>>>;
 
 /// The tables, and the cells that they choose among.
@@ -70,8 +73,9 @@ pub(super) struct ProductTable {
     sides: Vec<[Vec3; 2]>,
     /// Cells far brighter than the mean.
     peaks: Vec<usize>,
-    /// Of surfaces that scatter evenly, then of facets by width; then again for light samples that have help.
-    tables: [Tables; 2 * KINDS],
+    /// Of surfaces that scatter evenly, then of facets by width; then again for light samples that have help; then one more,
+    /// [`PLAIN`].
+    tables: [Tables; PLAIN + 1],
     /// See [`ProductTable::peak`].
     peak: f64,
     /// See [`ProductTable::map_flux`].
@@ -91,7 +95,7 @@ pub(super) enum Choice {
     Disc {
         /// Which.
         disc: usize,
-        /// In [0, 1).
+        /// In [0, 1].
         u: [f64; 2],
     },
 }
@@ -155,6 +159,15 @@ impl ProductTable {
         Some(ProductTable { partition, cells, sides, peaks, tables, peak: level.peak(), map_flux })
     }
 
+    /// As [`ProductTable::prepare`], for those who know nothing of the surface.
+    pub fn prepare_plain(&self, at: &Receiver, guide: &mut Guide) -> bool {
+        let which = if at.ns == Vec3::ZERO { ALL_ROUND } else { octahedron::find(at.ns) };
+        guide.tables = [(PLAIN * OF_KIND + which) as u32; 2];
+        guide.shares = [1.0, 0.0];
+        guide.worth = 1.0;
+        self.table(guide.tables[0]).is_some()
+    }
+
     /// Numbers of the tables of a receiver, and how often each is asked; false if nothing can arrive.
     #[inline]
     pub fn prepare(&self, at: &Receiver, lobes: &Lobes, guide: &mut Guide) -> bool {
@@ -206,9 +219,11 @@ impl ProductTable {
             }
         }
         let sum = |of: &[f32]| of.iter().zip(&weights).map(|(x, w)| f64::from(x * w)).sum::<f64>();
-        if kind < KINDS {
+        if kind < KINDS || kind == PLAIN {
             weights.iter_mut().zip(&cells.flux).for_each(|(w, flux)| *w *= flux);
-            self.limit_peaks(&mut weights);
+            if kind < KINDS {
+                self.limit_peaks(&mut weights);
+            }
         } else {
             let (flux, angle) = (sum(&cells.flux), sum(&cells.angle));
             let mean = if angle > 0.0 { (flux / angle) as f32 } else { 0.0 };
@@ -290,10 +305,10 @@ impl ProductTable {
             };
         }
         let found = self.table(number)?.find([x, u[1]]);
-        let places = self.partition.places();
-        Some(match places.get(found.cell) {
-            Some(place) => Choice::Map { at: place.point(found.u), cell: found.cell },
-            None => Choice::Disc { disc: found.cell - places.len(), u: found.u },
+        let patches = self.partition.patches();
+        Some(match patches.get(found.cell) {
+            Some(patch) => Choice::Map { at: patch.point(found.u), cell: found.cell },
+            None => Choice::Disc { disc: found.cell - patches.len(), u: found.u },
         })
     }
 
@@ -310,7 +325,7 @@ impl ProductTable {
     /// The density per u and v of the charts within a cell of the map.
     #[inline]
     pub fn density(&self, guide: &Guide, cell: usize) -> f64 {
-        self.pmf(guide, cell) * self.partition.places()[cell].density
+        self.pmf(guide, cell) * self.partition.patches()[cell].density
     }
 
     /// The cell of the map that a point lies in.
@@ -322,7 +337,7 @@ impl ProductTable {
     /// The probability of a disc.
     #[inline]
     pub fn disc_pmf(&self, guide: &Guide, disc: usize) -> f64 {
-        self.pmf(guide, self.partition.places().len() + disc)
+        self.pmf(guide, self.partition.patches().len() + disc)
     }
 
     /// Largest luminance of a cell of the finest grid, without the sky's intensity.
@@ -337,7 +352,7 @@ impl ProductTable {
 
     /// Number of cells of the map.
     pub fn cells(&self) -> usize {
-        self.partition.places().len()
+        self.partition.patches().len()
     }
 
     /// For people.

@@ -44,12 +44,12 @@ pub(in super::super) struct Partition {
     nodes: Vec<Node>,
     cells: Vec<Rect>,
     /// The same for those who draw from them.
-    places: Vec<Place>,
+    patches: Vec<Patch>,
 }
 
 /// A cell as those who draw from it need it.
 #[derive(Debug, Clone, Copy)]
-pub(in super::super) struct Place {
+pub(in super::super) struct Patch {
     chart: u32,
     /// Least u and v.
     from: [f64; 2],
@@ -61,11 +61,11 @@ pub(in super::super) struct Place {
     pub density: f64,
 }
 
-impl Place {
+impl Patch {
     fn new(rect: &Rect, grid: &ChartGrid) -> Self {
         let (w, h) = (f64::from(grid.width), f64::from(grid.height));
         let span = [rect.x, rect.y].map(|[a, b]| f64::from(b - a));
-        Place {
+        Patch {
             chart: rect.chart,
             from: [f64::from(rect.x[0]) / w, f64::from(rect.y[0]) / h],
             size: [span[0] / w, span[1] / h],
@@ -282,13 +282,13 @@ impl Partition {
                 cells.push(rect);
             }
         }
-        let places = cells.iter().map(|r| Place::new(r, &grid)).collect();
-        Partition { grid, across, down, nodes, cells, places }
+        let patches = cells.iter().map(|r| Patch::new(r, &grid)).collect();
+        Partition { grid, across, down, nodes, cells, patches }
     }
 
     /// All cells.
-    pub fn places(&self) -> &[Place] {
-        &self.places
+    pub fn patches(&self) -> &[Patch] {
+        &self.patches
     }
 
     /// The number of the cell that a point lies in.
@@ -353,6 +353,6 @@ impl Partition {
 
     /// Bytes held.
     pub fn memory(&self) -> u64 {
-        (size_of_val(&*self.nodes) + size_of_val(&*self.cells) + size_of_val(&*self.places)) as u64
+        (size_of_val(&*self.nodes) + size_of_val(&*self.cells) + size_of_val(&*self.patches)) as u64
     }
 }

@@ -224,6 +224,21 @@ mod tests {
     }
 
     #[test]
+    fn probabilities_of_like_weights_are_theirs_to_a_few_thousandths() {
+        let mut rng = TestRng::new(7);
+        let weights: Vec<f32> =
+            (0..1024).map(|i| if i % 2 == 0 { 0.0 } else { 0.3 + rng.vec2().x }).collect();
+        let places: Vec<Place> = (0..1024).map(|_| Place { at: rng.vec2().to_array(), lie: 0 }).collect();
+        let table = Table::new(&weights, &places).unwrap();
+        let total: f64 = weights.iter().map(|w| f64::from(*w)).sum();
+        for (i, w) in weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
+            let ratio = table.pmf(i) / (f64::from(*w) / total);
+            // A unit of rounding at either end of a cell, in each of two rows, of the 300 or more of the least.
+            assert!((ratio - 1.0).abs() < 4.0 / 300.0, "{i}: {ratio}");
+        }
+    }
+
+    #[test]
     fn half_of_all_is_half_of_the_rows() {
         let mut weights = vec![1.0; 64];
         weights[20] = 63.0;

@@ -1,6 +1,7 @@
 //! Product sampling as integrators use it: prepared for a surface that scatters in some way.
 
 use super::*;
+use crate::base::material::Scattering;
 
 const SCATTERINGS: [Scattering; 4] = [
     Scattering::EVEN,
@@ -48,7 +49,7 @@ fn probabilities_of_all_cells_and_discs_sum_to_one() {
 
 #[test]
 fn what_a_surface_makes_of_it_is_drawn_as_the_density_says() {
-    // Counts in the coarse cells and discs against their probabilities: what the tests of the light alone, which know an
+    // Counts in the cells and discs against their probabilities: what the tests of the light alone, which know an
     // even surface only, do not reach.
     let mut light_of = Vec::new();
     each_sky(|what, sky| light_of.push((what.to_owned(), light(sky, SkySampling::Product, 77.0))));
@@ -131,7 +132,7 @@ fn an_open_diffuse_surface_hardly_varies() {
     let (at, f) = (facing(n), |w: Vec3| 0.3 * w.dot(n).max(0.0));
     let of = |sampling| variance(&light(&sky, sampling, 0.0), &at, n, &f);
     let (product, table) = (of(SkySampling::Product), of(SkySampling::Table));
-    // What is left is the cosine within coarse cells of 11 degrees.
+    // What is left is the cosine within cells of 11 degrees or less.
     assert!(product < 0.12 && product < 0.2 * table, "{product} {table}");
 }
 
