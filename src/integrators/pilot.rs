@@ -37,8 +37,6 @@ const SEED: u64 = 0x7069_6c6f_7400_0000;
 /// Part of the squared mean that is added to a pixel's own, as in relMSE: what a dark pixel counts for.
 const EPSILON: f64 = 0.01;
 
-/// What a camera ray costs that meets nothing, in the same.
-const BARE_COST: f64 = 0.12;
 /// How steeply squared errors fall with the number of samples: the exponent at which cost counts against variance.
 const SLOPE: f64 = 1.2;
 
@@ -47,27 +45,55 @@ const SAMPLE_COST: f64 = 2.0;
 /// The same of a coherent camera ray, a scattered ray with the surface that it may meet, and a shadow ray with its light
 /// sample.
 const RAY_COSTS: [f64; 3] = [0.5, 1.6, 1.6];
+/// What a sample that meets no surface costs in all, in the same.
+const BARE_COST: f64 = 0.12;
 
 /// Most contrast of a light that scattered rays, or light samples that know little of narrow lobes, are trusted with.
 /// A pilot of thousands of samples overlooks what is met by one in some hundreds at most; at this contrast that is worth
 /// some percent of the mean.
 const TAME: f32 = 16.0;
 
-/// What is best in most scenes for surfaces that scatter evenly, and for others: several samples for each camera ray, whose
-/// surface point costs as much as two of them.
-const EVEN: Strategy = Strategy::Light(8);
-const FACETS: Strategy = Strategy::Both(4);
 /// How much better than the first candidate another has to look: so much is noise.
 const MARGIN: f64 = 0.7;
 
-/// What is tried for a material, the most likely first. Scattered rays alone miss what is small and bright. So do light samples on narrow lobes:
-/// within a coarse cell with a sun, the rest of the cell is hardly ever drawn, and a lobe may lie just there.
-fn candidates(is_even: bool, contrast: f32) -> &'static [Strategy] {
-    match (contrast <= TAME, is_even) {
-        (true, true) => &[EVEN, Strategy::Light(2), Strategy::Both(1), Strategy::Bsdf],
-        (false, true) => &[EVEN, Strategy::Light(2), Strategy::Both(1)],
-        (true, false) => &[FACETS, Strategy::Both(1), Strategy::Bsdf],
-        (false, false) => &[FACETS, Strategy::Both(1)],
+/// What may be chosen in a scene.
+struct Choices {
+    /// What is best in most scenes for surfaces that scatter evenly, and for others: several samples for each camera ray,
+    /// whose surface point costs as much as two of them, where the integrator takes more than one.
+    even: Strategy,
+    others: Strategy,
+    /// Whether the light is trusted, see [`TAME`].
+    is_tame: bool,
+}
+
+impl Choices {
+    fn new(tracer: &PathTracer, scene: &Scene, contrast: f32) -> Self {
+        let (splits, ends) = (scene.lights.list.len() == 1, tracer.max_depth == 1);
+        Choices {
+            even: Strategy::Light(if splits { 8 } else { 1 }),
+            others: Strategy::Both(if splits && ends { 4 } else { 1 }),
+            is_tame: contrast <= TAME,
+        }
+    }
+
+    fn usual(&self, is_even: bool) -> Strategy {
+        if is_even { self.even } else { self.others }
+    }
+
+    /// What is tried for a material, the most likely first. Scattered rays alone miss what is small and bright. So do light
+    /// samples on narrow lobes: tables know their widths and middles, not their shapes.
+    fn candidates(&self, is_even: bool) -> Vec<Strategy> {
+        let mut all = vec![self.usual(is_even)];
+        if self.even == Strategy::Light(8) && is_even {
+            all.push(Strategy::Light(2));
+        }
+        if all[0] != Strategy::Both(1) {
+            all.push(Strategy::Both(1));
+        }
+        if self.is_tame {
+            all.push(Strategy::Bsdf);
+        }
+        all
     }
 }
 
@@ -119,7 +145,7 @@ pub(super) fn choose(tracer: &PathTracer, scene: &Scene, plan: &PilotPlan) -> Op
     if !(tracer.auto_strategy && tracer.light_sampling && tracer.mis) {
         return None;
     }
-    let contrast = scene.lights.guided()?.1.contrast();
+    let choices = Choices::new(tracer, scene, scene.lights.guided()?.1.contrast());
     let mut classes = Classes::new(scene);
     let mut rays = RayCounts::default();
     let samples = plan.pixels.area() as f64 * f64::from(plan.spp);
@@ -134,12 +160,12 @@ pub(super) fn choose(tracer: &PathTracer, scene: &Scene, plan: &PilotPlan) -> Op
     rays.add(&bare.rays);
     for class in classes.list.iter_mut().filter(|c| !c.material.is_delta() && !c.material.is_black()) {
         if class.pixels.len().min(most) < LEAST {
-            class.strategy = if class.is_even { EVEN } else { FACETS };
+            class.strategy = choices.usual(class.is_even);
             continue;
         }
-        let candidates = candidates(class.is_even, contrast);
-        if let [only] = candidates {
-            class.strategy = *only;
+        let candidates = choices.candidates(class.is_even);
+        if let [only] = candidates[..] {
+            class.strategy = only;
             continue;
         }
         let area = class.pixels.len() as f64;
@@ -222,7 +248,8 @@ impl Bare {
             return Bare { error: 0.0, cost: 0.0, rays: RayCounts::default() };
         }
         thin(pixels, most);
-        let trial = Trial::run(tracer, scene, plan, pixels, EVEN);
+        // What is on the outlines may be of any kind.
+        let trial = Trial::run(tracer, scene, plan, pixels, Strategy::Both(1));
         let means = means(std::slice::from_ref(&trial));
         let each = 2.0 * f64::from(SAMPLES);
         Bare { error: area * trial.error(&means), cost: area * each * BARE_COST, rays: trial.rays }
