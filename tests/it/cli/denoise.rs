@@ -22,7 +22,7 @@ fn the_layer_has_less_noise_and_the_picture_is_left_alone() {
     let scene = std::fs::read_to_string(f.path().join("scene.toml")).unwrap();
     let ball = "[[objects]]\nshape = { type = \"sphere\", center = [0.4, 0.2, -1], radius = 1.3 }\nmaterial = \"clay\"\n";
     f.write("ball.toml", scene.replace("\"constant\"", "\"midday\"") + ball);
-    // By light samples that leave something to do: by products, eight samples have less noise than outlines have error.
+    // By light samples that leave something to do; what is left by products is below.
     let render = |flags: &str| {
         f.run(&format!("render ball.toml --size 192x144 --sky-sampling table {flags}")).succeeds()
     };
@@ -39,6 +39,14 @@ fn the_layer_has_less_noise_and_the_picture_is_left_alone() {
         let [before, after] = [data(&both, c), denoised].map(|x| mean_square(x, data(&truth, c)));
         // Measured: a third to a tenth; what is left is the noise of outlines, which are as thin as a pixel.
         assert!(after < before / 2.0, "{c}: {before} {after}");
+    }
+    // By products, the noise of eight samples is mostly that of outlines (measured: 0.69 of it is left): still no worse.
+    f.run("render ball.toml --size 192x144 --spp 8 --aov variance --denoise -o usual.exr").succeeds();
+    let usual = planes(&f, "usual.exr");
+    for c in ["R", "G", "B"] {
+        let error = |name: &str| mean_square(data(&usual, name), data(&truth, c));
+        let [before, after] = [c.to_owned(), format!("denoised.{c}")].map(|name| error(&name));
+        assert!(after < before, "{c}: {before} {after}");
     }
     let report = &f.json("s.json")["denoised"];
     assert!((report["mean_ratio"].as_f64().unwrap() - 1.0).abs() < 0.01, "{report}");
