@@ -69,6 +69,9 @@ struct SamplingArgs {
     /// everywhere [default: integrate]
     #[arg(long, value_name = "integrate|sample")]
     sky_pixels: Option<SkyPixels>,
+    /// Samples of pixels that outlines run through, at most, for each of another's (1: as many) [default: 8]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
+    outlines: Option<u32>,
     /// Seed of every random choice [default: 0]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -219,6 +222,7 @@ impl SamplingArgs {
             sampler: plan.sampler.unwrap_or(usual.sampler),
             filter: plan.filter.unwrap_or(usual.filter),
             skip_background: self.sky_pixels != Some(SkyPixels::Sample),
+            outlines: self.outlines.unwrap_or(usual.outlines),
             threads,
             moments: plan.output.moments,
             aovs: plan.output.aovs.clone(),

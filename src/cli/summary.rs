@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::integrators::{Avoided, RayCounts};
 use crate::memory::{self, in_words};
 use crate::render::settings::RenderSettings;
-use crate::render::{RenderStats, Rendered};
+use crate::render::{OutlineStats, RenderStats, Rendered};
 use crate::scene::{BuildReport, Scene};
 use serde::Serialize;
 use std::fmt;
@@ -130,6 +130,8 @@ pub struct Record {
     samples: u64,
     /// Pixels that no geometry projects into, and their samples that needed no ray.
     skipped: Skipped,
+    /// Pixels with more samples.
+    outlines: OutlineStats,
     msamples_per_second: f64,
     /// Where a clock or a target decided.
     rounds: Option<Rounds>,
@@ -168,6 +170,7 @@ impl Record {
             },
             samples: stats.samples,
             skipped: Skipped::of(stats),
+            outlines: stats.outlines,
             msamples_per_second: per_second(stats.samples),
             rounds: Rounds::new(rendered, settings),
             rays: Rays {
@@ -284,6 +287,10 @@ impl fmt::Display for Record {
         )?;
         if let Some(rounds) = &self.rounds {
             write!(f, "{rounds}")?;
+        }
+        if self.outlines.pixels > 0 {
+            let OutlineStats { pixels, times } = self.outlines;
+            writeln!(f, "        {times} times as many in {} of outlines", plural(pixels, "pixel"))?;
         }
         let r = &self.rays;
         writeln!(

@@ -28,6 +28,8 @@ pub(super) struct Block<'a> {
     pub strategies: &'a Strategies,
     /// Whether surfaces may take several samples of the only light.
     pub splits: bool,
+    /// Of how many of these they take one; at least 1. See [`super::CameraBatch::times`].
+    pub times: u32,
     /// Whether rays that are scattered at this depth end where they land.
     pub ends: bool,
     /// Whether rays that are scattered at this depth can meet no other light than the guided one.

@@ -40,6 +40,7 @@ impl PathTracer {
             Strategy::Both(n) if block.splits && block.ends => u32::from(n),
             _ => 1,
         };
+        let split = (split / block.times).max(1);
         let scattered = if strategy.is_light() { 0 } else { split };
         let before = work.shadow.len();
         if !delta {

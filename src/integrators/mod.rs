@@ -64,6 +64,9 @@ pub struct CameraBatch {
     pub spread: f32,
     /// Whether [`PathResults::first`] is wanted.
     pub want_first: bool,
+    /// How many samples these pixels take for each of another, if more than one: what takes several samples of a light for
+    /// each camera ray takes as many fewer.
+    pub times: u32,
 }
 
 /// Identities as a structure of arrays, all of one length.
@@ -180,8 +183,8 @@ pub struct Workspace {
 }
 
 /// What a render tells an integrator beforehand, so that it may try out what pays.
-#[derive(Debug, Clone, Copy)]
-pub struct PilotPlan {
+#[derive(Clone, Copy)]
+pub struct PilotPlan<'a> {
     /// Pixels that will be rendered.
     pub pixels: PixelRect,
     /// Samples that each of them will take, at most.
@@ -190,6 +193,8 @@ pub struct PilotPlan {
     pub seed: u64,
     /// Kind of its points.
     pub kind: Sampler,
+    /// Pixels that do not count, as they will take more samples than others.
+    pub is_outline: &'a (dyn Fn(u32, u32) -> bool + Sync),
 }
 
 /// An integrator that has adapted to a scene.

@@ -7,9 +7,7 @@ use super::pending::Pending;
 use super::points::VertexPoints;
 use super::strategy::{Strategies, Strategy};
 use super::surface::Surface;
-use super::{
-    CameraBatch, FirstHit, Integrator, PathIds, PathResults, PilotPlan, Specialised, Workspace, pilot,
-};
+use super::{CameraBatch, FirstHit, Integrator, PathResults, PilotPlan, Specialised, Workspace, pilot};
 use crate::base::hit::{HitBatch, NO_PRIMITIVE};
 use crate::base::light::Receiver;
 use crate::base::material::Prepared;
@@ -164,7 +162,7 @@ impl Integrator for PathTracer {
             depth += 1;
             std::mem::swap(&mut paths.states, &mut paths.next);
             std::mem::swap(&mut rays, &mut work.next);
-            let block = self.block(scene, &batch.ids, depth);
+            let block = self.block(scene, batch, depth);
             if depth > self.max_depth && !scene.features.emitting_surfaces {
                 block.leave_or_end(&rays, work, &mut paths, out);
                 paths.next.clear();
@@ -208,17 +206,18 @@ impl PathTracer {
         })
     }
 
-    fn block<'a>(&'a self, scene: &'a Scene, ids: &'a PathIds, depth: u32) -> Block<'a> {
+    fn block<'a>(&'a self, scene: &'a Scene, batch: &'a CameraBatch, depth: u32) -> Block<'a> {
         let lights = &scene.lights;
         let guided = if self.light_sampling { lights.guided() } else { None };
         Block {
             scene,
-            ids,
+            ids: &batch.ids,
             depth,
             mis: self.mis,
             each_light: self.each_light && lights.list.len() <= MOST_EACH,
             guided,
             strategies: &self.strategies,
+            times: batch.times.max(1),
             splits: depth == 1 && lights.list.len() == 1,
             ends: depth == self.max_depth,
             guided_alone: depth >= self.max_depth
@@ -239,7 +238,7 @@ impl PathTracer {
         let rays = &batch.rays;
         work.counts.camera += rays.len() as u64;
         scene.kernel.intersect_batch(rays, &mut work.hits, Coherence::Coherent);
-        let block = self.block(scene, &batch.ids, 1);
+        let block = self.block(scene, batch, 1);
         paths.begin(&mut work.next, &mut work.shadow);
         if work.hits.none() {
             // Most batches of most pictures: nothing but sky, and nothing to sort out.

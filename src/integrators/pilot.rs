@@ -197,8 +197,8 @@ fn scout(scene: &Scene, plan: &PilotPlan, scouts: usize, classes: &mut Classes) 
     let step = ((area as f64 / scouts as f64).sqrt().ceil() as u32).max(1);
     let lattice = |from: u32, to: u32| (from + step / 2..to).step_by(step as usize);
     let rect = plan.pixels;
-    let pixels: Vec<[u32; 2]> =
-        lattice(rect.y0, rect.y1).flat_map(|y| lattice(rect.x0, rect.x1).map(move |x| [x, y])).collect();
+    let pixels = lattice(rect.y0, rect.y1).flat_map(|y| lattice(rect.x0, rect.x1).map(move |x| [x, y]));
+    let pixels: Vec<[u32; 2]> = pixels.filter(|[x, y]| !(plan.is_outline)(*x, *y)).collect();
     let coordinate = |axis: usize| pixels.iter().map(|p| p[axis] as f32 + 0.5).collect::<Vec<f32>>();
     let (x, y, half) = (coordinate(0), coordinate(1), vec![0.5; pixels.len()]);
     let lens: &[f32] = if scene.camera.has_lens() { &half } else { &[] };

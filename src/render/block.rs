@@ -4,6 +4,7 @@ use super::backdrop::Backdrop;
 use super::coverage::Coverage;
 use super::film::{FilmTile, REPLICATES};
 use super::layers::Layers;
+use super::outlines::Outlines;
 use super::settings::RenderSettings;
 use crate::base::camera::FilmSamples;
 use crate::base::pixel_rect::PixelRect;
@@ -78,12 +79,23 @@ pub struct Job<'a> {
     pub points: PointSet,
     /// Which pixels see any geometry; None where all may.
     pub coverage: Option<&'a Coverage>,
+    /// Which pixels take more samples.
+    pub outlines: Option<Outlined<'a>>,
+}
+
+/// See [`Job::outlines`].
+#[derive(Clone, Copy)]
+pub struct Outlined<'a> {
+    /// Which.
+    pub pixels: &'a Outlines,
+    /// Their sample points.
+    pub points: PointSet,
 }
 
 impl<'a> Job<'a> {
     /// With a ray for every sample.
     pub fn new(scene: &'a Scene, integrator: &'a dyn Integrator, settings: &'a RenderSettings) -> Self {
-        Job { scene, integrator, settings, points: settings.points(), coverage: None }
+        Job { scene, integrator, settings, points: settings.points(), coverage: None, outlines: None }
     }
 }
 
@@ -137,6 +149,7 @@ impl Worker {
         self.layers.reset(rect);
         self.batch.spread = job.scene.camera.pixel_spread();
         self.batch.want_first = !job.settings.aovs.is_empty();
+        self.batch.times = 1;
         let replicates = job.settings.replicates();
         let indices: [Range<u32>; REPLICATES] =
             std::array::from_fn(|replicate| replicate_indices(&range, replicate as u32, replicates));
@@ -145,27 +158,44 @@ impl Worker {
         if has_free {
             self.backdrop.fill(job.scene, job.settings.filter, rect);
         }
+        let is_outline = |x, y| job.outlines.is_some_and(|o| o.pixels.contains(x, y));
         for (x, y) in rect.pixels() {
-            if has_free && free(x, y) && self.spare(x, y, &indices) {
+            if is_outline(x, y) || has_free && free(x, y) && self.spare(x, y, &indices) {
                 continue;
             }
-            for (replicate, indices) in (0..).zip(&indices).filter(|(_, indices)| !indices.is_empty()) {
-                let mut first = indices.start;
-                while first < indices.end {
-                    let room = BATCH - self.film_x.len();
-                    let len = room.min((indices.end - first) as usize);
-                    self.add_run(
-                        job,
-                        Run { x, y, replicate, first_index: first, start: self.film_x.len(), len },
-                    );
-                    first += len as u32;
-                    if self.film_x.len() == BATCH {
-                        self.flush(job);
-                    }
+            self.add_pixel(job, &job.points, [x, y], &indices);
+        }
+        self.flush(job);
+        let Some(Outlined { pixels, points }) = job.outlines else { return };
+        self.batch.times = pixels.times();
+        let indices = indices.map(|i| i.start * pixels.times()..i.end.saturating_mul(pixels.times()));
+        for (x, y) in rect.pixels().filter(|&(x, y)| pixels.contains(x, y)) {
+            self.add_pixel(job, &points, [x, y], &indices);
+        }
+        self.flush(job);
+    }
+
+    /// Samples of one pixel, traced whenever a batch is full.
+    fn add_pixel(
+        &mut self,
+        job: &Job,
+        points: &PointSet,
+        [x, y]: [u32; 2],
+        indices: &[Range<u32>; REPLICATES],
+    ) {
+        for (replicate, indices) in (0..).zip(indices).filter(|(_, indices)| !indices.is_empty()) {
+            let mut first = indices.start;
+            while first < indices.end {
+                let room = BATCH - self.film_x.len();
+                let len = room.min((indices.end - first) as usize);
+                let run = Run { x, y, replicate, first_index: first, start: self.film_x.len(), len };
+                self.add_run(points, run);
+                first += len as u32;
+                if self.film_x.len() == BATCH {
+                    self.flush(job);
                 }
             }
         }
-        self.flush(job);
     }
 
     /// Adds a pixel that sees nothing without sampling it; false if it must be sampled all the same.
@@ -182,9 +212,9 @@ impl Worker {
     }
 
     /// Notes a run: whose samples they are, and at which pixel.
-    fn add_run(&mut self, job: &Job, run: Run) {
+    fn add_run(&mut self, points: &PointSet, run: Run) {
         let end = run.start + run.len;
-        let sampler = job.points.pixel(run.x, run.y, run.replicate);
+        let sampler = points.pixel(run.x, run.y, run.replicate);
         let key = ray_key(run.x, run.y, run.replicate);
         self.batch.ids.extend(PathId { sampler, index: run.first_index, key }, run.len);
         self.film_x.resize(end, run.x as f32 + 0.5);

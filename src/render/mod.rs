@@ -9,6 +9,7 @@ pub mod film;
 pub mod film_layers;
 pub mod fixed;
 pub mod layers;
+pub mod outlines;
 pub mod settings;
 
 use crate::error::{Error, Result};
@@ -16,11 +17,13 @@ use crate::integrators::{Avoided, Integrator, PilotPlan, RayCounts, Specialised}
 use crate::memory;
 use crate::scene::Scene;
 use adaptive::{Reached, Schedule, Task};
-use block::{BadSample, Job, Worker};
+use block::{BadSample, Job, Outlined, Worker};
 use coverage::Coverage;
 use film::Film;
 use layers::Layers;
+use outlines::Outlines;
 use rayon::prelude::*;
+use serde::Serialize;
 use settings::RenderSettings;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -58,6 +61,15 @@ pub struct Rendered {
     pub stats: RenderStats,
 }
 
+/// Pixels that outlines run through.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct OutlineStats {
+    /// How many; 0 if they were not looked for.
+    pub pixels: u64,
+    /// How many samples each took for one of another pixel.
+    pub times: u32,
+}
+
 /// Counts and times of a render.
 #[derive(Debug, Clone, Default)]
 pub struct RenderStats {
@@ -85,6 +97,8 @@ pub struct RenderStats {
     pub decided: String,
     /// Pixels that no geometry projects into.
     pub free_pixels: u64,
+    /// Pixels with more samples.
+    pub outlines: OutlineStats,
     /// Samples of those that needed no ray: their pixels got the filter's integral of what is behind everything.
     pub spared: u64,
     /// Rays that were not needed; zeros of integrators that do not count them.
@@ -133,7 +147,12 @@ impl Renderer {
             layers: Layers::new(crop, &s.aovs),
             stats: RenderStats::default(),
         };
-        let plan = PilotPlan { pixels: crop, spp: s.spp, seed: s.seed, kind: s.sampler };
+        // A single sample a pixel shows what lies in its middle.
+        let outlines = if s.spp > 1 { Outlines::of(scene, crop, s.outlines) } else { None };
+        scene.kernel.take_failure()?;
+        let is_outline = |x, y| outlines.as_ref().is_some_and(|o| o.contains(x, y));
+        let plan =
+            PilotPlan { pixels: crop, spp: s.spp, seed: s.seed, kind: s.sampler, is_outline: &is_outline };
         let adapted = if s.pilot { self.integrator.specialise(scene, &plan) } else { None };
         let integrator = match adapted {
             Some(Specialised { integrator, decided, rays }) => {
@@ -142,12 +161,16 @@ impl Renderer {
             }
             None => self.integrator.clone(),
         };
-        // A single sample a pixel shows what lies in its middle.
         let skips = s.skip_background && s.spp > 1 && integrator.shows_background();
         let coverage = if skips { Coverage::of(scene, crop, s.filter, s.spp) } else { None };
         let coverage = coverage.filter(|c| backdrop::pays(scene, s.filter, c, crop, s.spp));
         out.stats.free_pixels = coverage.as_ref().map_or(0, |c| c.free() as u64);
-        let job = Job { coverage: coverage.as_ref(), ..Job::new(scene, integrator.as_ref(), s) };
+        let outlined = outlines.as_ref().map(|o| Outlined { pixels: o, points: s.outline_points(o.times()) });
+        let job = Job {
+            coverage: coverage.as_ref(),
+            outlines: outlined,
+            ..Job::new(scene, integrator.as_ref(), s)
+        };
         let workers = Mutex::new(Vec::<Worker>::new());
         let mut schedule = Schedule::new(s, &out.film, out.stats.free_pixels);
         let in_time = |rounds: u32| s.time.is_none_or(|t| rounds == 0 || start.elapsed() < t);
@@ -180,6 +203,10 @@ impl Renderer {
             stats.spared += w.spared;
         }
         stats.samples = stats.rays.camera + stats.spared;
+        if let Some(outlines) = &outlines {
+            stats.outlines = OutlineStats { pixels: outlines.count() as u64, times: outlines.times() };
+            stats.pilot.camera += outlines.rays;
+        }
         stats.rays.add(&stats.pilot);
         stats.dropped = out.film.counts().dropped;
         stats.bad.sort_by_key(|b| (b.y, b.x, b.replicate, b.index));

@@ -10,6 +10,14 @@ use crate::sampling::filter::PixelFilter;
 use crate::scene::desc::SceneDesc;
 use std::time::Duration;
 
+/// See [`RenderSettings::outlines`]: more would gain little, as the error of an edge falls as the power 1.5 of samples.
+pub const OUTLINES: u32 = 8;
+/// Most of that.
+pub const MOST_OUTLINES: u32 = 64;
+
+/// Sets the points of outlines apart from those of other pixels.
+const OUTLINE_SEED: u64 = 0x6f75_746c_696e_6573;
+
 /// Settings of a render. Two renders with the same scene and settings give the same bits, whatever the threads.
 #[derive(Clone)]
 pub struct RenderSettings {
@@ -32,6 +40,9 @@ pub struct RenderSettings {
     /// Whether pixels that no geometry projects into get the filter's integral of what is behind everything, where that
     /// is known to a thousandth, instead of samples.
     pub skip_background: bool,
+    /// How many samples, at most, pixels that outlines run through take for each of another; 1 if no more. See
+    /// [`super::outlines`].
+    pub outlines: u32,
     /// Whether the film shall know how large its error is: each pixel's samples are then two independent randomisations,
     /// which are less even together than one. Targets and time limits ask for that by themselves.
     pub moments: bool,
@@ -74,6 +85,7 @@ impl RenderSettings {
             sampler: Sampler::default(),
             filter: PixelFilter::default(),
             skip_background: true,
+            outlines: OUTLINES,
             moments: false,
             pilot: true,
             threads: std::thread::available_parallelism().map_or(1, |n| n.get()),
@@ -103,8 +115,17 @@ impl RenderSettings {
 
     /// The sample points of all pixels.
     pub fn points(&self) -> PointSet {
-        let count = self.spp.div_ceil(self.replicates());
-        self.sampler.points(self.seed, (!self.has_rounds()).then_some(count))
+        self.points_of(self.seed, 1)
+    }
+
+    /// Those of pixels that outlines run through, of which each takes so many `times` the samples of others.
+    pub fn outline_points(&self, times: u32) -> PointSet {
+        self.points_of(self.seed ^ OUTLINE_SEED, times)
+    }
+
+    fn points_of(&self, seed: u64, times: u32) -> PointSet {
+        let count = self.spp.saturating_mul(times).div_ceil(self.replicates());
+        self.sampler.points(seed, (!self.has_rounds()).then_some(count))
     }
 
     /// Whether what was sampled decides how many samples pixels get.
@@ -119,6 +140,12 @@ impl RenderSettings {
         }
         if self.spp == 0 {
             return Err(Error::Usage("at least one sample a pixel is needed (--spp 1)".into()));
+        }
+        if !(1..=MOST_OUTLINES).contains(&self.outlines) {
+            return Err(Error::Usage(format!(
+                "pixels that outlines run through take 1 to {MOST_OUTLINES} times the samples of others, not {}",
+                self.outlines
+            )));
         }
         self.target.map_or(Ok(()), |t| t.check())
     }

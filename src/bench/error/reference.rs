@@ -88,6 +88,7 @@ impl Reference {
         settings.seed = SEED;
         // What is on trial does not stand as judge.
         settings.skip_background = false;
+        settings.outlines = 1;
         settings.moments = true;
         let renderer = Renderer { integrator: renderer.integrator.clone(), settings };
         let film = renderer.render(scene, progress)?.film;

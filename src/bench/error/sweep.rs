@@ -54,6 +54,11 @@ pub static KEYS: &[Key] = &[
         s.settings.skip_background = choose("sky pixels", v, &[("integrate", true), ("sample", false)])?;
         Ok(())
     }),
+    Key::new("outlines", "samples of outlines for each of other pixels", |s, v| {
+        let number = |_| Error::Usage(format!("outlines take a number of samples, not \"{v}\""));
+        s.settings.outlines = v.parse().map_err(number)?;
+        s.settings.check()
+    }),
     Key::new("moments", "whether a render knows its own error", |s, v| {
         s.settings.moments = choose("moments", v, &[("true", true), ("false", false)])?;
         Ok(())
