@@ -56,6 +56,8 @@ pub struct Lobes {
     pub scattering: Scattering,
     /// Whether no scattered ray competes, so that all that is scattered has to be found.
     pub alone: bool,
+    /// How many samples will be taken whose numbers are even together; at least 1.
+    pub samples: u32,
 }
 
 /// What a guided light has worked out for one receiver: which of its tables it will ask, by numbers of its own.

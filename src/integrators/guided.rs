@@ -30,17 +30,17 @@ impl PathTracer {
         let strategy = if delta { Strategy::Bsdf } else { block.strategies.of(&s.v) };
         let (index, light) = guided;
         let mut guide = Guide::default();
-        let ready = strategy != Strategy::Bsdf && {
-            let scattering = s.material.scattering(&s.prepared).unwrap_or(Scattering::EVEN);
-            let lobes = Lobes { wo: s.v.wo, scattering, alone: strategy.is_light() };
-            light.prepare(&s.receiver, &lobes, &mut guide)
-        };
         let split = match strategy {
             Strategy::Light(n) if block.splits => u32::from(n),
             Strategy::Both(n) if block.splits && block.ends => u32::from(n),
             _ => 1,
         };
         let split = (split / block.times).max(1);
+        let ready = strategy != Strategy::Bsdf && {
+            let scattering = s.material.scattering(&s.prepared).unwrap_or(Scattering::EVEN);
+            let lobes = Lobes { wo: s.v.wo, scattering, alone: strategy.is_light(), samples: split };
+            light.prepare(&s.receiver, &lobes, &mut guide)
+        };
         let scattered = if strategy.is_light() { 0 } else { split };
         let before = work.shadow.len();
         if !delta {

@@ -30,7 +30,7 @@ use crate::base::light::{Guide, Lobes, Receiver};
 use crate::base::skybox::{ChartPoint, Skybox};
 use crate::math::Frame;
 use crate::math::simd::dispatch;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use partition::Partition;
 use std::sync::OnceLock;
 use table::{FIRST_BACK, Place, SECOND_BACK, SWAPPED, Table};
@@ -40,13 +40,17 @@ use weigh::{About, Columns, Even, Facets};
 const WIDTHS: usize = 12;
 /// Kinds of surfaces.
 const KINDS: usize = 1 + WIDTHS;
+/// Sets of tables with all kinds: for light samples alone, so many at once as [`Set`] tells apart, and for those that have
+/// help.
+const SETS: usize = 7;
 /// The kind of tables for those who know nothing of the surface: all of the light on an even one, its peaks whole.
-const PLAIN: usize = 2 * KINDS;
+const PLAIN: usize = SETS * KINDS;
 /// What counts as a peak: a cell of so many times the mean radiance.
 const PEAK: f64 = 32.0;
-/// Most of a table's weight that peaks may have together. A sun that is hidden leaves all to the other cells, which must
-/// not go without samples; and halves are what stratified points are best at.
-const MOST_OF_ALL: f32 = 0.5;
+/// The cosine of the largest angle between peaks and their middle where all of them are seen or hidden together: 5 degrees.
+const TOGETHER: f64 = 0.9962;
+/// Light samples of which peaks have at least this part are all for them.
+const PEAKS_ALONE: f32 = 0.9;
 /// Light samples that have help find nothing where less than this part of the light is left for them.
 const LEAST_LEFT: f64 = 1e-3;
 /// A light sample that has help is taken so many times as often as the part of the light that is left for it: at a
@@ -73,8 +77,9 @@ pub(super) struct ProductTable {
     sides: Vec<[Vec3; 2]>,
     /// Cells far brighter than the mean.
     peaks: Vec<usize>,
-    /// Of surfaces that scatter evenly, then of facets by width; then again for light samples that have help; then one more,
-    /// [`PLAIN`].
+    /// Whether they are [`TOGETHER`].
+    is_one_peak: bool,
+    /// Set by set, of surfaces that scatter evenly, then of facets by width; then one more, [`PLAIN`].
     tables: [Tables; PLAIN + 1],
     /// See [`ProductTable::peak`].
     peak: f64,
@@ -98,6 +103,43 @@ pub(super) enum Choice {
         /// In [0, 1].
         u: [f64; 2],
     },
+}
+
+/// What tells sets of tables apart.
+///
+/// Peaks may have no more than a part of a table's weight. A sun that is hidden leaves all to the other cells, which must
+/// not go without samples: half of the samples are for them, or where one peak is all there is, and several samples are
+/// taken, all but one. Parts are powers of two, at which stratified points are best: of n samples exactly one goes there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Set {
+    alone: bool,
+    /// Samples taken together: the power of two at most that, up to 8.
+    bits: u32,
+}
+
+impl Set {
+    fn of(lobes: &Lobes) -> Self {
+        let bits = lobes.samples.clamp(1, 8).ilog2();
+        // One sample or two that are alone are treated alike.
+        Set { alone: lobes.alone, bits: if lobes.alone { bits.max(1) } else { bits } }
+    }
+
+    fn number(self) -> usize {
+        if self.alone { self.bits as usize - 1 } else { 3 + self.bits as usize }
+    }
+
+    fn numbered(number: usize) -> Self {
+        match number {
+            0..3 => Set { alone: true, bits: number as u32 + 1 },
+            _ => Set { alone: false, bits: number as u32 - 3 },
+        }
+    }
+
+    /// Most of a table's weight that peaks may have together; all if 1.
+    fn most_of_all(self, is_one_peak: bool) -> f32 {
+        let bits = if is_one_peak { self.bits } else { self.bits.min(1) };
+        0.5f32.powi(bits as i32)
+    }
 }
 
 /// How often a sample is worth its ray that would find `total` of the `whole` light which scattered rays find anyway.
@@ -151,12 +193,26 @@ impl ProductTable {
         for disc in discs {
             cells.push(disc.frame.n, disc.sin, part(flux_of(disc)), std::f32::consts::TAU * disc.m);
         }
+        let places = lights.iter().map(|l| turn.map_or(l.middle, |t| t.to_world(l.middle)));
+        let places: Vec<_> = places.chain(discs.iter().map(|d| d.frame.n.as_dvec3())).collect();
         let bright = |flux: f64, angle: f64| flux * (4.0 * std::f64::consts::PI) > PEAK * total * angle;
         let map = lights.iter().map(|l| bright(l.flux, l.angle));
         let all = map.chain(discs.iter().map(|d| bright(flux_of(d), std::f64::consts::TAU * f64::from(d.m))));
-        let peaks = all.enumerate().filter(|(_, bright)| *bright).map(|(i, _)| i).collect();
+        let peaks: Vec<usize> = all.enumerate().filter(|(_, bright)| *bright).map(|(i, _)| i).collect();
+        let middle =
+            peaks.iter().map(|&i| places[i] * f64::from(cells.flux[i])).sum::<DVec3>().normalize_or_zero();
+        let is_one_peak = peaks.iter().all(|&i| places[i].dot(middle) > TOGETHER);
         let tables = std::array::from_fn(|_| Tables::new());
-        Some(ProductTable { partition, cells, sides, peaks, tables, peak: level.peak(), map_flux })
+        Some(ProductTable {
+            partition,
+            cells,
+            sides,
+            peaks,
+            is_one_peak,
+            tables,
+            peak: level.peak(),
+            map_flux,
+        })
     }
 
     /// As [`ProductTable::prepare`], for those who know nothing of the surface.
@@ -172,28 +228,37 @@ impl ProductTable {
     #[inline]
     pub fn prepare(&self, at: &Receiver, lobes: &Lobes, guide: &mut Guide) -> bool {
         let s = &lobes.scattering;
-        let first = if lobes.alone { 0 } else { KINDS };
+        let set = Set::of(lobes);
+        let first = set.number() * KINDS;
         let number = |kind: usize, which: usize| ((first + kind) * OF_KIND + which) as u32;
         let even = number(0, if at.ns == Vec3::ZERO { ALL_ROUND } else { octahedron::find(at.ns) });
         if s.facets <= 0.0 || at.ns == Vec3::ZERO {
             guide.tables = [even; 2];
             guide.shares = [1.0, 0.0];
             let table = self.table(even);
-            guide.worth = table.map_or(0.0, |t| worth(t.total, t.whole));
+            guide.worth = table.map_or(0.0, |t| worth(t.total, t.whole) * self.rarely(set, t.peaks, t.total));
             return table.is_some();
         }
         let mirrored = (2.0 * at.ns.dot(lobes.wo) * at.ns - lobes.wo).normalize_or(at.ns);
         let facets = number(1 + width_of(s.alpha), octahedron::find(mirrored));
         let sums = |number: u32, part: f32| match self.table(number) {
-            Some(t) if part > 0.0 => [part * t.total, part * t.whole],
-            _ => [0.0; 2],
+            Some(t) if part > 0.0 => [t.total, t.whole, t.peaks].map(|sum| part * sum),
+            _ => [0.0; 3],
         };
         let (of_even, of_facets) = (sums(even, s.even), sums(facets, s.facets));
         let sum = of_even[0] + of_facets[0];
         guide.tables = [even, facets];
         guide.shares = [of_even[0] / sum, of_facets[0] / sum];
-        guide.worth = worth(sum, of_even[1] + of_facets[1]);
+        guide.worth =
+            worth(sum, of_even[1] + of_facets[1]) * self.rarely(set, of_even[2] + of_facets[2], sum);
         sum > 0.0 && sum.is_finite()
+    }
+
+    /// Of several samples one is enough for a peak, where they are for nothing else: how often each is taken.
+    #[inline]
+    fn rarely(&self, set: Set, peaks: f32, total: f32) -> f32 {
+        let for_peaks = self.is_one_peak && !set.alone && peaks > PEAKS_ALONE * total;
+        if for_peaks { set.most_of_all(true) } else { 1.0 }
     }
 
     /// The table of a number; None if all is black there. After the first time, two loads.
@@ -219,10 +284,11 @@ impl ProductTable {
             }
         }
         let sum = |of: &[f32]| of.iter().zip(&weights).map(|(x, w)| f64::from(x * w)).sum::<f64>();
-        if kind < KINDS || kind == PLAIN {
+        let set = Set::numbered(kind / KINDS);
+        if kind == PLAIN || set.alone {
             weights.iter_mut().zip(&cells.flux).for_each(|(w, flux)| *w *= flux);
-            if kind < KINDS {
-                self.limit_peaks(&mut weights);
+            if kind != PLAIN {
+                self.limit_peaks(set, &mut weights);
             }
         } else {
             let (flux, angle) = (sum(&cells.flux), sum(&cells.angle));
@@ -234,18 +300,23 @@ impl ProductTable {
             if left < LEAST_LEFT * flux {
                 return None;
             }
+            let peaks: f32 = self.peaks.iter().map(|&i| weights[i]).sum();
+            if peaks <= PEAKS_ALONE * left as f32 {
+                self.limit_peaks(set, &mut weights);
+            }
             let mut table = Table::new(&weights, &self.places(axis, &weights))?;
-            table.whole = flux as f32;
+            (table.total, table.whole, table.peaks) = (left as f32, flux as f32, peaks);
             return Some(table);
         }
         Table::new(&weights, &self.places(axis, &weights))
     }
 
     /// Takes from the peaks what they have beyond their part.
-    fn limit_peaks(&self, weights: &mut [f32]) {
+    fn limit_peaks(&self, set: Set, weights: &mut [f32]) {
         let peaks: f32 = self.peaks.iter().map(|&i| weights[i]).sum();
         let rest = weights.iter().sum::<f32>() - peaks;
-        let most = rest * MOST_OF_ALL / (1.0 - MOST_OF_ALL);
+        let part = set.most_of_all(self.is_one_peak);
+        let most = rest * part / (1.0 - part);
         if rest > 0.0 && peaks > most {
             self.peaks.iter().for_each(|&i| weights[i] *= most / peaks);
         }

@@ -16,16 +16,22 @@ fn viewer(rng: &mut TestRng, n: Vec3) -> Vec3 {
     if w.dot(n) < 0.0 { -w } else { w }
 }
 
+/// Every scattering, alone or not, for a sample and for several at once.
+fn ways() -> impl Iterator<Item = (Scattering, bool, u32)> {
+    let alone = SCATTERINGS.into_iter().flat_map(|s| [(s, true), (s, false)]);
+    alone.flat_map(|(s, alone)| [1, 4, 8].map(|samples| (s, alone, samples)))
+}
+
 #[test]
 fn probabilities_of_all_cells_and_discs_sum_to_one() {
     each_sky(|what, sky| {
         let light = light(sky, SkySampling::Product, 30.0);
         let MapSampler::Product(table) = &light.map else { return };
         let mut rng = TestRng::new(1);
-        for (scattering, alone) in SCATTERINGS.into_iter().flat_map(|s| [(s, true), (s, false)]) {
+        for (scattering, alone, samples) in ways() {
             let at = facing(rng.direction());
             let mut guide = Guide::default();
-            let lobes = Lobes { wo: viewer(&mut rng, at.ns), scattering, alone };
+            let lobes = Lobes { wo: viewer(&mut rng, at.ns), scattering, alone, samples };
             if !light.prepare(&at, &lobes, &mut guide) {
                 continue;
             }
@@ -53,14 +59,14 @@ fn what_a_surface_makes_of_it_is_drawn_as_the_density_says() {
     // even surface only, do not reach.
     let mut light_of = Vec::new();
     each_sky(|what, sky| light_of.push((what.to_owned(), light(sky, SkySampling::Product, 77.0))));
-    let tests = (2 * light_of.len() * SCATTERINGS.len()) as u32;
+    let tests = (light_of.len() * ways().count()) as u32;
     let mut rng = TestRng::new(9);
     for (what, light) in &light_of {
         let MapSampler::Product(table) = &light.map else { continue };
-        for (scattering, alone) in SCATTERINGS.into_iter().flat_map(|s| [(s, true), (s, false)]) {
+        for (scattering, alone, samples) in ways() {
             let at = facing(rng.direction());
             let mut guide = Guide::default();
-            let lobes = Lobes { wo: viewer(&mut rng, at.ns), scattering, alone };
+            let lobes = Lobes { wo: viewer(&mut rng, at.ns), scattering, alone, samples };
             if !light.prepare(&at, &lobes, &mut guide) {
                 continue;
             }
@@ -107,7 +113,7 @@ fn variance(light: &SkyLight, at: &Receiver, wo: Vec3, material: &dyn Fn(Vec3) -
         let u = rng.vec2().to_array();
         let s = match guided {
             Some(g) => {
-                g.prepare(at, &Lobes { wo, scattering, alone: true }, &mut guide);
+                g.prepare(at, &Lobes { wo, scattering, alone: true, samples: 1 }, &mut guide);
                 g.sample(at, &guide, u)
             }
             None => light.sample_li(at, u),
