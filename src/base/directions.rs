@@ -40,6 +40,35 @@ impl<'a> Directions<'a> {
     }
 }
 
+/// How many of a few are worked out together.
+pub const LANES: usize = 8;
+
+/// Eight directions as columns of fixed length: loops over them become vector code.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(align(32))]
+pub struct DirectionLanes {
+    /// x of each.
+    pub x: [f32; LANES],
+    /// y of each.
+    pub y: [f32; LANES],
+    /// z of each.
+    pub z: [f32; LANES],
+}
+
+impl DirectionLanes {
+    /// Direction `k`.
+    #[inline(always)]
+    pub fn get(&self, k: usize) -> Vec3 {
+        Vec3::new(self.x[k], self.y[k], self.z[k])
+    }
+
+    /// Sets direction `k`.
+    #[inline(always)]
+    pub fn set(&mut self, k: usize, d: Vec3) {
+        [self.x[k], self.y[k], self.z[k]] = d.to_array();
+    }
+}
+
 /// Directions as a structure of arrays, owned; memory is kept when it is cleared.
 #[derive(Debug, Clone, Default)]
 pub struct DirectionBatch {
@@ -62,6 +91,13 @@ impl DirectionBatch {
         self.x.push(d.x);
         self.y.push(d.y);
         self.z.push(d.z);
+    }
+
+    /// Appends those of `all` that have these numbers.
+    pub fn extend_picked(&mut self, all: Directions, numbers: &[u32]) {
+        self.x.extend(numbers.iter().map(|&i| all.x[i as usize]));
+        self.y.extend(numbers.iter().map(|&i| all.y[i as usize]));
+        self.z.extend(numbers.iter().map(|&i| all.z[i as usize]));
     }
 
     /// All of them.

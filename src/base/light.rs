@@ -1,6 +1,6 @@
 //! Where light comes from. A sky is a light like any other; a path that leaves the scene has met it.
 
-use crate::base::directions::Directions;
+use crate::base::directions::{DirectionLanes, Directions, LANES};
 use crate::base::material::Scattering;
 use crate::base::space::RenderSpace;
 use crate::base::vertex::Vertex;
@@ -71,6 +71,15 @@ pub struct Guide {
     pub worth: f32,
 }
 
+/// A few samples of a light at infinity, whose radiance is asked for later (see [`LightSample::li`]).
+#[derive(Debug, Clone, Copy, Default)]
+pub struct LightLanes {
+    /// Unit directions towards the light.
+    pub wi: DirectionLanes,
+    /// Density per solid angle; 0 where nothing can arrive, or nothing was asked for.
+    pub pdf: [f32; LANES],
+}
+
 /// A light at infinity that chooses directions by what it brings times what the surface makes of it. For each receiver
 /// first [`GuidedLight::prepare`], then any of the others with the same guide.
 pub trait GuidedLight: Send + Sync {
@@ -79,6 +88,9 @@ pub trait GuidedLight: Send + Sync {
 
     /// As [`Light::sample_li`].
     fn sample(&self, at: &Receiver, guide: &Guide, u: [f32; 2]) -> Option<LightSample>;
+
+    /// [`GuidedLight::sample`] of the first `n` of these points, bit for bit.
+    fn sample_many(&self, at: &Receiver, guide: &Guide, u: &[[f32; LANES]; 2], n: usize) -> LightLanes;
 
     /// As [`Light::pdf_li`], of the direction `wi`.
     fn pdf(&self, at: &Receiver, guide: &Guide, wi: Vec3) -> f32;

@@ -1,5 +1,6 @@
 //! How a surface scatters and emits, in the local frame of its shading normal (z).
 
+use crate::base::directions::{DirectionLanes, LANES};
 use crate::base::shape::Needs;
 use crate::base::vertex::Vertex;
 use crate::color::Rgb;
@@ -71,6 +72,16 @@ pub struct BsdfEval {
     pub pdf: f32,
 }
 
+/// Values and densities of one direction with a few others, as columns.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(align(32))]
+pub struct BsdfLanes {
+    /// See [`BsdfEval::f_cos`]; a column for each channel.
+    pub f_cos: [[f32; LANES]; 3],
+    /// See [`BsdfEval::pdf`].
+    pub pdf: [f32; LANES],
+}
+
 /// Scattering and emission. All directions are local (z is the shading normal), of unit length and away from the
 /// surface; `wo` may lie below (z < 0) when the surface is seen from behind.
 pub trait Material: Send + Sync {
@@ -84,6 +95,17 @@ pub trait Material: Send + Sync {
 
     /// f |cos| and density for a pair of directions; zero for delta lobes.
     fn eval(&self, m: &Prepared, wo: Vec3, wi: Vec3) -> BsdfEval;
+
+    /// [`Material::eval`] of each `wi`, bit for bit. Those that are zero mean nothing, nor does what is made of them.
+    fn eval_many(&self, m: &Prepared, wo: Vec3, wi: &DirectionLanes) -> BsdfLanes {
+        let mut out = BsdfLanes::default();
+        for k in (0..LANES).filter(|&k| wi.get(k) != Vec3::ZERO) {
+            let e = self.eval(m, wo, wi.get(k));
+            [out.f_cos[0][k], out.f_cos[1][k], out.f_cos[2][k]] = e.f_cos.to_array();
+            out.pdf[k] = e.pdf;
+        }
+        out
+    }
 
     /// Whether [`Material::sample`] reads `uc` at all; if not, none is made.
     fn picks_lobe(&self) -> bool {

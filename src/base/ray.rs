@@ -1,6 +1,6 @@
 //! Rays, one by one and in batches.
 
-use crate::base::directions::Directions;
+use crate::base::directions::{DirectionLanes, Directions, LANES};
 use glam::Vec3;
 
 /// A segment `o + t d`, `tnear <= t <= tfar`; `d` need not be of unit length.
@@ -120,6 +120,20 @@ impl RayBatch {
         self.key.push(r.key);
     }
 
+    /// Appends rays without end from one origin in the first `n` of these directions, all with the same key.
+    #[inline]
+    pub fn push_several(&mut self, o: Vec3, d: &DirectionLanes, n: usize, key: u32) {
+        append(&mut self.ox, &[o.x; LANES], n);
+        append(&mut self.oy, &[o.y; LANES], n);
+        append(&mut self.oz, &[o.z; LANES], n);
+        append(&mut self.dx, &d.x, n);
+        append(&mut self.dy, &d.y, n);
+        append(&mut self.dz, &d.z, n);
+        append(&mut self.tnear, &[0.0; LANES], n);
+        append(&mut self.tfar, &[f32::INFINITY; LANES], n);
+        append(&mut self.key, &[key; LANES], n);
+    }
+
     /// Ray `i`.
     #[inline]
     pub fn get(&self, i: usize) -> Ray {
@@ -142,4 +156,12 @@ impl RayBatch {
     pub fn direction(&self, i: usize) -> Vec3 {
         Vec3::new(self.dx[i], self.dy[i], self.dz[i])
     }
+}
+
+/// Appends the first `n`: all of them, which is one instruction or two, less those that are too many.
+#[inline(always)]
+fn append<T: Copy>(column: &mut Vec<T>, lanes: &[T; LANES], n: usize) {
+    let len = column.len() + n;
+    column.extend_from_slice(lanes);
+    column.truncate(len);
 }

@@ -1,6 +1,6 @@
 //! Radiance by direction, cut into charts so that one light can sample every kind of sky.
 
-use crate::base::directions::Directions;
+use crate::base::directions::{Directions, LANES};
 use crate::color::Rgb;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -14,6 +14,49 @@ pub struct ChartPoint {
     pub u: f64,
     /// Along.
     pub v: f64,
+}
+
+/// A few points of charts as columns.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(align(64))]
+pub struct ChartLanes {
+    /// Across.
+    pub u: [f64; LANES],
+    /// Along.
+    pub v: [f64; LANES],
+    /// Which chart.
+    pub chart: [u32; LANES],
+}
+
+/// Their directions, with [`Skybox::solid_angle_density`].
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(align(64))]
+pub struct ChartDirections {
+    /// x of each.
+    pub x: [f64; LANES],
+    /// y of each.
+    pub y: [f64; LANES],
+    /// z of each.
+    pub z: [f64; LANES],
+    /// Steradians per unit of u and v.
+    pub density: [f64; LANES],
+}
+
+impl ChartLanes {
+    /// Point `k`.
+    #[inline(always)]
+    pub fn get(&self, k: usize) -> ChartPoint {
+        ChartPoint { chart: self.chart[k], u: self.u[k], v: self.v[k] }
+    }
+}
+
+impl ChartDirections {
+    /// Sets number `k` to a direction and its density.
+    #[inline(always)]
+    pub fn set(&mut self, k: usize, (d, density): (DVec3, f64)) {
+        [self.x[k], self.y[k], self.z[k]] = d.to_array();
+        self.density[k] = density;
+    }
 }
 
 /// How the sphere of directions is cut: `count` charts of `width` x `height` cells each.
@@ -70,6 +113,13 @@ pub trait Skybox: Send + Sync {
     /// [`Skybox::direction`] and [`Skybox::solid_angle_density`] of a point, which share most of their arithmetic.
     fn direction_and_density(&self, c: ChartPoint) -> (DVec3, f64) {
         (self.direction(c), self.solid_angle_density(c))
+    }
+
+    /// [`Skybox::direction_and_density`] of the first `n` points, bit for bit; what it makes of the others means nothing.
+    fn directions_and_densities(&self, at: &ChartLanes, n: usize) -> ChartDirections {
+        let mut out = ChartDirections::default();
+        (0..n).for_each(|k| out.set(k, self.direction_and_density(at.get(k))));
+        out
     }
 
     /// The integral of luminance over each cell of a `grid` at most as fine as the natural one, in double,

@@ -3,6 +3,7 @@
 
 use crate::base::directions::{DirectionBatch, Directions};
 use crate::base::light::Light;
+use crate::base::ray::RayBatch;
 use crate::color::Rgb;
 use crate::scene::Scene;
 use crate::scene::desc::Background;
@@ -39,6 +40,19 @@ impl Escapes {
     pub fn push(&mut self, number: u32, wi: Vec3) {
         self.directions.push(wi);
         self.numbers.push(number);
+    }
+
+    /// The rays of a batch that `wanted` picks by their numbers, and no others. Nobody can foretell which: without a branch.
+    pub fn pick(&mut self, rays: &RayBatch, wanted: impl Fn(usize) -> bool) {
+        self.directions.clear();
+        self.numbers.resize(rays.len(), 0);
+        let mut n = 0;
+        for i in 0..rays.len() {
+            self.numbers[n] = i as u32;
+            n += usize::from(wanted(i));
+        }
+        self.numbers.truncate(n);
+        self.directions.extend_picked(rays.directions(), &self.numbers);
     }
 
     /// All of them with the radiance of a light at infinity.

@@ -4,13 +4,18 @@ use super::Workspace;
 use super::depth::Block;
 use super::path::{PathScratch, PathTracer};
 use super::points::VertexPoint;
+use super::several::Counts;
 use super::strategy::{MOST_SPLIT, Strategy};
 use super::surface::Surface;
 use super::{PathId, light_dim};
+use crate::base::directions::LANES;
 use crate::base::light::{ChosenLight, Guide, GuidedLight, Lobes};
 use crate::base::material::Scattering;
 use crate::sampler::{Dim, Slot};
 use glam::Vec3;
+
+/// So few samples are not worth being worked out together.
+const FEW: f32 = 2.0;
 
 /// A guided light and its index.
 type Guided<'a> = (u32, &'a dyn GuidedLight);
@@ -78,8 +83,9 @@ impl PathTracer {
         let id = paths.points.get(s.number).id;
         let id = PathId { sampler: id.sampler.times(split), index: id.index.wrapping_mul(split), ..id };
         let points = draw(&id, Dim::at(block.depth, Slot::BsdfUv));
-        for (k, &bsdf) in (0..).zip(&points[..split as usize]) {
+        for k in 0..split {
             let id = PathId { index: id.index.wrapping_add(k), ..id };
+            let bsdf = points.map(|column| column[k as usize]);
             let point = VertexPoint { id, light: [0.0; 2], bsdf, share: 1.0 / split as f32 };
             self.extend(block, s, &point, work, paths, guided_pdf);
         }
@@ -88,10 +94,9 @@ impl PathTracer {
 
 /// The points of some samples from one on, as many as any surface takes.
 #[inline]
-fn draw(first: &PathId, dim: Dim) -> [[f32; 2]; MOST_SPLIT as usize] {
-    let [mut x, mut y] = [[0.0; MOST_SPLIT as usize]; 2];
-    first.sampler.fill_2d(first.index, dim, &mut x, &mut y);
-    std::array::from_fn(|k| [x[k], y[k]])
+fn draw(first: &PathId, dim: Dim) -> [[f32; LANES]; 2] {
+    const { assert!(MOST_SPLIT as usize <= LANES) };
+    first.sampler.few_2d(first.index, dim)
 }
 
 /// How the guided light is sampled from a surface.
@@ -150,10 +155,20 @@ impl Block<'_> {
         let id = paths.points.get(s.number).id;
         let id = PathId { sampler: id.sampler.times(n), index: id.index.wrapping_mul(n), ..id };
         let points = draw(&id, Dim::at(self.depth, Slot::LightUv));
-        let chosen = ChosenLight { light: how.guided.0, pmf: n as f32 };
-        for u in &points[..n as usize] {
-            self.ask_one(s, how, chosen, *u, work, paths);
+        if !how.ready {
+            return;
         }
+        let (light, guided) = how.guided;
+        if how.guide.worth * n as f32 <= FEW {
+            let chosen = ChosenLight { light, pmf: n as f32 };
+            for k in 0..n as usize {
+                self.ask_one(s, how, chosen, points.map(|column| column[k]), work, paths);
+            }
+            return;
+        }
+        let lanes = guided.sample_many(&s.receiver, &how.guide, &points, n as usize);
+        let counts = Counts { lit: n as f32, scattered: how.scattered };
+        self.connect_many(s, light, &lanes, counts, work, paths);
     }
 
     #[inline]

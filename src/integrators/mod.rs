@@ -13,7 +13,8 @@ pub mod path;
 mod pending;
 mod pilot;
 mod points;
-pub mod strategy;
+mod several;
+mod strategy;
 mod surface;
 pub mod whitted;
 

@@ -31,15 +31,14 @@ pub(super) fn add_arriving(
     escapes: &mut Escapes,
     li: &mut [Rgb],
 ) {
-    let arriving = || (0..).zip(pending).filter(|(i, _)| !shadow.blocked[*i as usize]);
-    for (_, p) in arriving().filter(|(_, p)| p.ask.is_none()) {
+    let ShadowRays { rays, blocked } = shadow;
+    // What they ask can be foretold, whether they are blocked cannot.
+    let answered = pending.iter().zip(blocked).filter(|(p, _)| p.ask.is_none());
+    for (p, _) in answered.filter(|(_, blocked)| !**blocked) {
         li[p.index as usize] += p.value;
     }
     for &light in &scene.lights.at_infinity {
-        escapes.clear();
-        for (i, _) in arriving().filter(|(_, p)| p.ask == Some(light)) {
-            escapes.push(i, shadow.rays.direction(i as usize));
-        }
+        escapes.pick(rays, |i| !blocked[i] & (pending[i].ask == Some(light)));
         for e in escapes.ask(&*scene.lights.list[light as usize]) {
             let p = &pending[e.number as usize];
             li[p.index as usize] += p.value * e.le;

@@ -30,7 +30,7 @@ pub(super) struct Surface<'a> {
     transmission: Option<Transmission>,
     pub(super) prepared: Prepared,
     /// Local direction to the viewer.
-    wo: Vec3,
+    pub(super) wo: Vec3,
     pub(super) receiver: Receiver,
     lit: Option<(ChosenLight, LightSample)>,
 }
@@ -229,6 +229,6 @@ impl Block<'_> {
 }
 
 #[inline]
-fn key(id: &PathId, depth: u32) -> u32 {
+pub(super) fn key(id: &PathId, depth: u32) -> u32 {
     ray_key(id.key, id.index, depth)
 }

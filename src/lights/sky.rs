@@ -1,12 +1,15 @@
 //! The light of a sky, of whatever kind.
 
+mod many;
 mod options;
 mod placed;
 mod plan;
 mod product;
 
-use crate::base::directions::{DirectionBatch, Directions};
-use crate::base::light::{Extent, Guide, GuidedLight, Light, LightSample, Lobes, PathEnd, Receiver};
+use crate::base::directions::{DirectionBatch, Directions, LANES};
+use crate::base::light::{
+    Extent, Guide, GuidedLight, Light, LightLanes, LightSample, Lobes, PathEnd, Receiver,
+};
 use crate::base::skybox::{ChartGrid, ChartPoint, Skybox};
 use crate::color::Rgb;
 use crate::error::{Error, Result};
@@ -374,6 +377,13 @@ impl GuidedLight for SkyLight {
         };
         let seen = wi.dot(at.ng) >= 0.0 && pdf > 0.0;
         seen.then_some(LightSample { wi, dist: f32::INFINITY, li: None, pdf, delta: false })
+    }
+
+    fn sample_many(&self, at: &Receiver, guide: &Guide, u: &[[f32; LANES]; 2], n: usize) -> LightLanes {
+        match &self.map {
+            MapSampler::Product(table) => self.sample_product(table, at, guide, u, n),
+            _ => LightLanes::default(),
+        }
     }
 
     fn pdf(&self, at: &Receiver, guide: &Guide, wi: Vec3) -> f32 {

@@ -1,6 +1,7 @@
 //! Lambert's surface, lit and seen from the same side, whichever it is.
 
-use crate::base::material::{BsdfEval, BsdfSample, Material, Prepared, Scattering};
+use crate::base::directions::{DirectionLanes, LANES};
+use crate::base::material::{BsdfEval, BsdfLanes, BsdfSample, Material, Prepared, Scattering};
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::base::shape::Needs;
 use crate::base::vertex::Vertex;
@@ -57,6 +58,19 @@ impl Material for Diffuse {
         }
         let pdf = cosine_hemisphere_pdf(wi.z.abs());
         BsdfEval { f_cos: *m.view::<Rgb>() * pdf, pdf }
+    }
+
+    fn eval_many(&self, m: &Prepared, wo: Vec3, wi: &DirectionLanes) -> BsdfLanes {
+        let albedo = m.view::<Rgb>().to_array();
+        let mut out = BsdfLanes::default();
+        for k in 0..LANES {
+            let pdf = cosine_hemisphere_pdf(wi.z[k].abs());
+            out.pdf[k] = if wo.z * wi.z[k] <= 0.0 { 0.0 } else { pdf };
+        }
+        for (column, albedo) in out.f_cos.iter_mut().zip(albedo) {
+            (0..LANES).for_each(|k| column[k] = albedo * out.pdf[k]);
+        }
+        out
     }
 
     #[inline]

@@ -1,6 +1,7 @@
 //! A surface that glows, and may scatter as a diffuse one.
 
-use crate::base::material::{BsdfEval, BsdfSample, Emitter, Material, Prepared, Scattering};
+use crate::base::directions::DirectionLanes;
+use crate::base::material::{BsdfEval, BsdfLanes, BsdfSample, Emitter, Material, Prepared, Scattering};
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::base::shape::Needs;
 use crate::base::vertex::Vertex;
@@ -78,6 +79,10 @@ impl Material for Emissive {
 
     fn eval(&self, m: &Prepared, wo: Vec3, wi: Vec3) -> BsdfEval {
         self.body.eval(m, wo, wi)
+    }
+
+    fn eval_many(&self, m: &Prepared, wo: Vec3, wi: &DirectionLanes) -> BsdfLanes {
+        self.body.eval_many(m, wo, wi)
     }
 
     fn picks_lobe(&self) -> bool {

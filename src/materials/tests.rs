@@ -1,5 +1,6 @@
 //! What every material must satisfy, whatever it is.
 
+use crate::base::directions::{DirectionLanes, LANES};
 use crate::base::material::{BsdfEval, Material, Prepared};
 use crate::base::registry::{Params, Row, Value, build};
 use crate::base::shape::Needs;
@@ -210,6 +211,23 @@ fn samples_agree_with_eval() {
                 let t = tolerance(s.pdf);
                 assert!((e.pdf - s.pdf).abs() <= t * s.pdf, "{} {wo}: {s:?} {e:?}", m.label);
                 assert!(close(e.f_cos / e.pdf, s.weight, t), "{} {wo}: {s:?} {e:?}", m.label);
+            }
+        }
+    }
+}
+
+#[test]
+fn directions_evaluated_together_are_as_each() {
+    for m in members().iter().filter(|m| m.scatters()) {
+        let mut rng = TestRng::new(12);
+        for wo in views().into_iter().flat_map(|w| [w, -w]) {
+            let mut wi = DirectionLanes::default();
+            (1..LANES).for_each(|k| wi.set(k, rng.direction()));
+            let all = m.it.eval_many(&m.prepared, wo, &wi);
+            for k in 1..LANES {
+                let e = m.eval(wo, wi.get(k));
+                let got = all.f_cos.map(|channel| channel[k]);
+                assert_eq!((got, all.pdf[k]), (e.f_cos.to_array(), e.pdf), "{}", m.label);
             }
         }
     }

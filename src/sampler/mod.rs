@@ -177,6 +177,11 @@ impl PixelSampler {
         })
     }
 
+    /// `get_2d` of the eight samples from `first_index` on, as columns.
+    pub fn few_2d(&self, first_index: u32, dim: Dim) -> [[f32; 8]; 2] {
+        dispatch(Few { sampler: *self, first_index, dim })
+    }
+
     /// `get_2d` for the samples `first_index ..` of this pixel, as many as the shorter slice takes.
     pub fn fill_2d(&self, first_index: u32, dim: Dim, out_x: &mut [f32], out_y: &mut [f32]) {
         dispatch(FillPixel { sampler: self, first_index, dim, out: [out_x, out_y] });
@@ -226,6 +231,42 @@ impl Kernel for FillPixel<'_> {
             }
         }
     }
+}
+
+struct Few {
+    sampler: PixelSampler,
+    first_index: u32,
+    dim: Dim,
+}
+
+impl Kernel for Few {
+    type Output = [[f32; 8]; 2];
+
+    #[inline(always)]
+    fn run(self) -> [[f32; 8]; 2] {
+        let Few { sampler: PixelSampler { key }, first_index: first, dim } = self;
+        match self.sampler.kind() {
+            Sampler::ZSobol => {
+                let pair = zsobol::pair(key, dim);
+                few(|i| pair.point(zsobol::index(key, first.wrapping_add(i))))
+            }
+            Sampler::OwenSobol => {
+                let pair = owen_sobol::Pair::new(key, dim);
+                few(|i| pair.point(first.wrapping_add(i)))
+            }
+            Sampler::Independent => few(|i| independent::point(key, dim, first.wrapping_add(i))),
+        }
+    }
+}
+
+/// A loop of known length, which vectors do at once: they are wider than what [`FillPixel`] would leave over.
+#[inline(always)]
+fn few(point: impl Fn(u32) -> [u32; 2]) -> [[f32; 8]; 2] {
+    let mut out = [[0.0; 8]; 2];
+    for i in 0..8 {
+        [out[0][i], out[1][i]] = point(i as u32).map(to_unit_f32);
+    }
+    out
 }
 
 struct FillPaths<'a> {

@@ -42,6 +42,8 @@ fn batches_and_scalars_agree_to_the_bit() {
             let step = 1.0 / 16_777_216.0;
             assert!((0..2).all(|k| (0.0..step).contains(&(fine[k] - f64::from([xs[i], ys[i]][k])))));
         }
+        let [few_x, few_y] = p.few_2d(13, dim);
+        assert_eq!((&few_x[..], &few_y[..]), (&xs[..8], &ys[..8]));
         let pixels: Vec<_> = (0..77).map(|i| points.pixel(i, 2 * i, 0)).collect();
         let indices: Vec<u32> = (0..77).map(|i| i * i).collect();
         points_2d(&pixels, &indices, dim, &mut xs, &mut ys);

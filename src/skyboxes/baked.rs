@@ -4,7 +4,7 @@ use super::cube::{self, Cube};
 use super::noise::{Points, WIDE};
 use crate::base::directions::Directions;
 use crate::base::image_data::{ImageData, Texels};
-use crate::base::skybox::{ChartGrid, ChartPoint, SkyDisc, Skybox};
+use crate::base::skybox::{ChartDirections, ChartGrid, ChartLanes, ChartPoint, SkyDisc, Skybox};
 use crate::color::Rgb;
 use crate::math::simd;
 use crate::sampler::hash::mix64;
@@ -202,6 +202,10 @@ impl Skybox for Baked {
 
     fn direction_and_density(&self, c: ChartPoint) -> (DVec3, f64) {
         self.cube.direction_and_density(c)
+    }
+
+    fn directions_and_densities(&self, at: &ChartLanes, n: usize) -> ChartDirections {
+        self.cube.directions_and_densities(at, n)
     }
 
     fn cell_integrals(&self, grid: ChartGrid) -> Vec<f64> {

@@ -5,10 +5,10 @@
 
 use super::texel::{self, CellSums, Spread};
 use super::tiles::{self, CHUNK, Footprint, Footprints, Strides, Tiles};
-use crate::base::directions::Directions;
+use crate::base::directions::{Directions, LANES};
 use crate::base::image_data::{ImageData, Texels};
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
-use crate::base::skybox::{ChartGrid, ChartPoint, Skybox, integrate_cells};
+use crate::base::skybox::{ChartDirections, ChartGrid, ChartLanes, ChartPoint, Skybox, integrate_cells};
 use crate::color::Rgb;
 use crate::math::simd;
 use crate::memory;
@@ -236,6 +236,36 @@ impl Placing {
     }
 }
 
+/// See [`Skybox::direction_and_density`]. The axes of [`FACES`] by choices instead of loads, so that many can be done at
+/// once.
+#[inline(always)]
+fn toward(c: ChartPoint) -> (DVec3, f64) {
+    let (s, t) = (2.0 * c.u - 1.0, 1.0 - 2.0 * c.v);
+    let r = 1.0 / (1.0 + s * s + t * t).sqrt();
+    let sign = if c.chart & 1 == 0 { 1.0 } else { -1.0 };
+    let (along_x, along_y) = (c.chart < 2, c.chart & 2 != 0);
+    let x = if along_x { sign } else { s * if along_y { 1.0 } else { sign } };
+    let y = if along_y { sign } else { t };
+    let z = sign * if along_x { -s } else { 1.0 };
+    let z = if along_y { -sign * t } else { z };
+    (DVec3::new(x, y, z) * r, 4.0 * r * r * r)
+}
+
+struct Toward<'a>(&'a ChartLanes);
+
+impl simd::Kernel for Toward<'_> {
+    type Output = ChartDirections;
+
+    #[inline(always)]
+    fn run(self) -> ChartDirections {
+        let mut out = ChartDirections::default();
+        for k in 0..LANES {
+            out.set(k, toward(self.0.get(k)));
+        }
+        out
+    }
+}
+
 /// Looks up a batch.
 struct Lookups<'a> {
     cube: &'a Cube,
@@ -328,10 +358,11 @@ impl Skybox for Cube {
 
     #[inline]
     fn direction_and_density(&self, c: ChartPoint) -> (DVec3, f64) {
-        let f = &FACES[c.chart as usize];
-        let (s, t) = (2.0 * c.u - 1.0, 1.0 - 2.0 * c.v);
-        let r = 1.0 / (1.0 + s * s + t * t).sqrt();
-        ((f.major + f.across * s + f.up * t) * r, 4.0 * r * r * r)
+        toward(c)
+    }
+
+    fn directions_and_densities(&self, at: &ChartLanes, _n: usize) -> ChartDirections {
+        simd::dispatch(Toward(at))
     }
 
     fn cell_integrals(&self, grid: ChartGrid) -> Vec<f64> {

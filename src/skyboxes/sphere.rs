@@ -2,13 +2,18 @@
 //!
 //! u = 0.5 + atan2(z, x) / 2 pi to the right, elevation from the bottom to the top: the middle column looks along +x.
 
+mod lookups;
+
 use super::texel::{self, CellSums, Spread, Tap};
+use crate::base::directions::{Directions, LANES};
 use crate::base::image_data::ImageData;
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
-use crate::base::skybox::{ChartGrid, ChartPoint, Skybox};
+use crate::base::skybox::{ChartDirections, ChartGrid, ChartLanes, ChartPoint, Skybox};
 use crate::color::Rgb;
-use crate::math::trig::atan2_turns;
+use crate::math::simd;
+use crate::math::trig::{atan2_turns, sin_cos_2pi_f64};
 use glam::{DVec3, Vec3};
+use lookups::Lookups;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -72,19 +77,47 @@ impl Sphere {
     }
 }
 
+/// Where a direction lies among so many texels.
+#[inline(always)]
+fn tap([w, h]: [f32; 2], [x, y, z]: [f32; 3]) -> Tap {
+    let turns = atan2_turns(z, x) + 0.5;
+    // By both legs rather than by asin, which has no digits left near the poles.
+    let below = 0.5 - 2.0 * atan2_turns(y, (x * x + z * z).sqrt());
+    Tap::new(turns * w, below * h)
+}
+
+/// See [`Skybox::direction_and_density`].
+#[inline(always)]
+fn toward(c: ChartPoint) -> (DVec3, f64) {
+    // From -x, where u begins.
+    let (a, p) = (sin_cos_2pi_f64(c.u), sin_cos_2pi_f64(0.5 * c.v));
+    (DVec3::new(-p.sin * a.cos, p.cos, -p.sin * a.sin), TAU * PI * p.sin)
+}
+
+struct Toward<'a>(&'a ChartLanes);
+
+impl simd::Kernel for Toward<'_> {
+    type Output = ChartDirections;
+
+    #[inline(always)]
+    fn run(self) -> ChartDirections {
+        let mut out = ChartDirections::default();
+        for k in 0..LANES {
+            out.set(k, toward(self.0.get(k)));
+        }
+        out
+    }
+}
+
 impl Skybox for Sphere {
     #[inline]
     fn radiance(&self, d: Vec3) -> Rgb {
-        let (w, h) = (self.image.width, self.image.height);
-        let turns = atan2_turns(d.z, d.x) + 0.5;
-        // By both legs rather than by asin, which has no digits left near the poles.
-        let below = 0.5 - 2.0 * atan2_turns(d.y, (d.x * d.x + d.z * d.z).sqrt());
-        let tap = Tap::new(turns * w as f32, below * h as f32);
-        if (tap.x as u32) < w as u32 - 1 && (tap.y as u32) < h as u32 - 1 {
-            texel::bilinear(&self.image.texels, w, tap)
-        } else {
-            self.across_edges(tap)
-        }
+        let size = [self.image.width as f32, self.image.height as f32];
+        self.at(tap(size, d.to_array()))
+    }
+
+    fn radiance_batch(&self, d: Directions, out: &mut [Rgb]) {
+        simd::dispatch(Lookups { sphere: self, d, out });
     }
 
     fn grid(&self) -> ChartGrid {
@@ -113,9 +146,11 @@ impl Skybox for Sphere {
     }
 
     fn direction_and_density(&self, c: ChartPoint) -> (DVec3, f64) {
-        let (sin_a, cos_a) = ((c.u - 0.5) * TAU).sin_cos();
-        let (sin_p, cos_p) = (c.v * PI).sin_cos();
-        (DVec3::new(sin_p * cos_a, cos_p, sin_p * sin_a), TAU * PI * sin_p)
+        toward(c)
+    }
+
+    fn directions_and_densities(&self, at: &ChartLanes, _n: usize) -> ChartDirections {
+        simd::dispatch(Toward(at))
     }
 
     fn cell_integrals(&self, grid: ChartGrid) -> Vec<f64> {

@@ -1,8 +1,8 @@
 //! What every kind of sky must keep, run on the sample parameters of its row.
 
 use super::REGISTRY;
-use crate::base::directions::DirectionBatch;
-use crate::base::skybox::{ChartGrid, ChartPoint, Skybox};
+use crate::base::directions::{DirectionBatch, LANES};
+use crate::base::skybox::{ChartGrid, ChartLanes, ChartPoint, Skybox};
 use crate::testing::rows::{Built, built, check_rows};
 use crate::testing::{TestRng, integrate_rect};
 use glam::{DVec3, Vec3};
@@ -140,6 +140,30 @@ fn batches_and_constants_agree_with_single_lookups() {
             assert_eq!(sky.radiance(d), l, "{what}");
             assert!(l.is_finite() && l.r >= 0.0 && l.g >= 0.0 && l.b >= 0.0, "{what}: {l:?} towards {d}");
             assert!(sky.constant().is_none_or(|c| c == l), "{what}");
+        }
+    });
+}
+
+#[test]
+fn points_of_charts_worked_on_together_are_those_of_each() {
+    each(|what, sky| {
+        let mut rng = TestRng::new(6);
+        for n in [1, 3, LANES] {
+            let points: [ChartPoint; LANES] = std::array::from_fn(|_| random_point(sky, &mut rng));
+            let lanes =
+                ChartLanes { u: points.map(|c| c.u), v: points.map(|c| c.v), chart: points.map(|c| c.chart) };
+            let all = sky.directions_and_densities(&lanes, n);
+            for (k, &c) in points[..n].iter().enumerate() {
+                let (d, density) = sky.direction_and_density(c);
+                assert_eq!(
+                    [d.x, d.y, d.z, density],
+                    [all.x[k], all.y[k], all.z[k], all.density[k]],
+                    "{what}"
+                );
+                // A few roundings of numbers up to 1, and of 2 pi^2.
+                assert!((d - sky.direction(c)).length() < 2e-15, "{what}: {d} at {c:?}");
+                assert!((density - sky.solid_angle_density(c)).abs() < 4e-14, "{what}: {density} at {c:?}");
+            }
         }
     });
 }

@@ -19,6 +19,7 @@
 //! Weights may be wrong by any factor and only cost variance, as long as none is zero where
 //! light is scattered that nothing else finds.
 
+mod choose;
 mod octahedron;
 mod partition;
 mod table;
@@ -30,10 +31,11 @@ use crate::base::light::{Guide, Lobes, Receiver};
 use crate::base::skybox::{ChartPoint, Skybox};
 use crate::math::Frame;
 use crate::math::simd::dispatch;
+pub(super) use choose::Chosen;
 use glam::{DVec3, Vec3};
 use partition::Partition;
 use std::sync::OnceLock;
-use table::{FIRST_BACK, Place, SECOND_BACK, SWAPPED, Table};
+use table::{FIRST_BACK, MOST_CELLS, Place, SECOND_BACK, SWAPPED, Table};
 use weigh::{About, Columns, Even, Facets};
 
 /// Widths of facets' lobes that have tables of their own, each sqrt(2) times the next.
@@ -56,15 +58,13 @@ const LEAST_LEFT: f64 = 1e-3;
 /// A light sample that has help is taken so many times as often as the part of the light that is left for it: at a
 /// hundredth, the one in 25 brings a noise of 4 % where a scattered ray brings all of its own.
 const WORTH: f32 = 4.0;
-/// Cells, with the discs.
-const MOST_CELLS: usize = 1024;
 /// More are left to BSDF sampling. (Skies have one or two.)
 const MOST_DISCS: usize = 256;
 /// Tables of one kind: by direction, and one for surfaces that scatter all round.
 const ALL_ROUND: usize = octahedron::COUNT;
 const OF_KIND: usize = ALL_ROUND + 1;
 
-/// Tables of one kind, made on demand; None where all is black. Each takes up to 9 kB: a picture of one material some ten
+/// Tables of one kind, made on demand; None where all is black. Each takes up to 12 kB: a picture of one material some ten
 /// megabytes at most, one with facets of all widths in all directions two hundred.
 type Tables = OnceLock<Vec<OnceLock<Option<Box<Table>>>>>;
 
@@ -347,7 +347,7 @@ impl ProductTable {
                 let [a, b] = sides.map(way);
                 let swapped = a[0].abs() + b[1].abs() < a[1].abs() + b[0].abs();
                 let (first, second) = if swapped { (a[1], b[0]) } else { (a[0], b[1]) };
-                let bit = |is: bool, bit: u16| if is { bit } else { 0 };
+                let bit = |is: bool, bit: u32| if is { bit } else { 0 };
                 place.lie =
                     bit(swapped, SWAPPED) | bit(first < 0.0, FIRST_BACK) | bit(second < 0.0, SECOND_BACK);
             }
@@ -378,7 +378,7 @@ impl ProductTable {
         let found = self.table(number)?.find([x, u[1]]);
         let patches = self.partition.patches();
         Some(match patches.get(found.cell) {
-            Some(patch) => Choice::Map { at: patch.point(found.u), cell: found.cell },
+            Some(patch) => Choice::Map { at: self.partition.point(patch, found.u), cell: found.cell },
             None => Choice::Disc { disc: found.cell - patches.len(), u: found.u },
         })
     }

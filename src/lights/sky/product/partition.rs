@@ -45,40 +45,58 @@ pub(in super::super) struct Partition {
     cells: Vec<Rect>,
     /// The same for those who draw from them.
     patches: Vec<Patch>,
+    scale: Scale,
 }
 
-/// A cell as those who draw from it need it.
-#[derive(Debug, Clone, Copy)]
+/// A cell as those who draw from it need it: half of a line of memory. In cells of the grid, which are fewer than f32 can
+/// count.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(align(32))]
 pub(in super::super) struct Patch {
-    chart: u32,
     /// Least u and v.
-    from: [f64; 2],
+    pub from: [f32; 2],
     /// How much u and v span.
-    size: [f64; 2],
-    /// What part of a side directions keep off the border: more than the rounding to f32 can carry them back over.
-    rim: [f64; 2],
-    /// One over the area.
+    pub span: [f32; 2],
+    pub chart: u32,
+    /// One over the area on the charts.
     pub density: f64,
+}
+
+/// From cells of the grid to charts.
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct Scale {
+    /// Of a cell on the charts.
+    size: [f64; 2],
+    /// How far directions keep off a patch's border: more than the rounding to f32 can carry them back over.
+    rim: [f64; 2],
+}
+
+impl Scale {
+    fn new(grid: &ChartGrid) -> Self {
+        let sides = [grid.width, grid.height].map(f64::from);
+        Scale { size: sides.map(|n| 1.0 / n), rim: sides.map(|n| n * 1.5e-7) }
+    }
+
+    /// A coordinate of the chart's point (u, then v) at this part of a patch's side, in [0, 1].
+    #[inline(always)]
+    pub fn at(&self, axis: usize, from: f32, span: f32, part: f64) -> f64 {
+        let (span, rim) = (f64::from(span), self.rim[axis]);
+        let x = part * span;
+        let x = if x < rim { rim } else { x };
+        let x = if x > span - rim { span - rim } else { x };
+        (f64::from(from) + x) * self.size[axis]
+    }
 }
 
 impl Patch {
     fn new(rect: &Rect, grid: &ChartGrid) -> Self {
-        let (w, h) = (f64::from(grid.width), f64::from(grid.height));
-        let span = [rect.x, rect.y].map(|[a, b]| f64::from(b - a));
+        let span = [rect.x, rect.y].map(|[a, b]| (b - a) as f32);
         Patch {
             chart: rect.chart,
-            from: [f64::from(rect.x[0]) / w, f64::from(rect.y[0]) / h],
-            size: [span[0] / w, span[1] / h],
-            rim: [w * 1.5e-7 / span[0], h * 1.5e-7 / span[1]],
-            density: w * h / (span[0] * span[1]),
+            from: [rect.x[0] as f32, rect.y[0] as f32],
+            span,
+            density: f64::from(grid.width) * f64::from(grid.height) / rect.cells(),
         }
-    }
-
-    /// The chart's point at these parts of the sides, in [0, 1].
-    #[inline(always)]
-    pub fn point(&self, part: [f64; 2]) -> ChartPoint {
-        let at = |k: usize| self.from[k] + self.size[k] * part[k].clamp(self.rim[k], 1.0 - self.rim[k]);
-        ChartPoint { chart: self.chart, u: at(0), v: at(1) }
     }
 }
 
@@ -283,12 +301,25 @@ impl Partition {
             }
         }
         let patches = cells.iter().map(|r| Patch::new(r, &grid)).collect();
-        Partition { grid, across, down, nodes, cells, patches }
+        Partition { grid, across, down, nodes, cells, patches, scale: Scale::new(&grid) }
     }
 
     /// All cells.
     pub fn patches(&self) -> &[Patch] {
         &self.patches
+    }
+
+    /// What their numbers mean.
+    #[inline(always)]
+    pub fn scale(&self) -> &Scale {
+        &self.scale
+    }
+
+    /// The point at these parts of a patch's sides, in [0, 1].
+    #[inline(always)]
+    pub fn point(&self, patch: &Patch, part: [f64; 2]) -> ChartPoint {
+        let [u, v] = [0, 1].map(|k| self.scale.at(k, patch.from[k], patch.span[k], part[k]));
+        ChartPoint { chart: patch.chart, u, v }
     }
 
     /// The number of the cell that a point lies in.

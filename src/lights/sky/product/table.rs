@@ -7,19 +7,23 @@
 const ROWS: usize = 16;
 /// What probabilities within a row are multiples of one over.
 const UNITS: i16 = i16::MAX;
-/// Cells of a row are counted in eights: what vector registers hold.
-const LANES: usize = 8;
+/// Where the search for an entry begins is known for so many parts of a row, each of 2^`PART` units ...
+const PARTS: usize = 16;
+const PART: u32 = 11;
+/// ... and from there it passes so many entries at once: what a vector register holds, and mostly all that there are.
+const AT_ONCE: usize = 16;
 
 /// See the module. Probabilities are exact multiples of their units, and whatever has weight has at least one.
 pub(super) struct Table {
-    /// Where rows begin in `ends` and `cells`.
-    starts: [u16; ROWS + 1],
-    /// Running sums of units over the entries of a row; padded with all of them.
+    /// For each part of each row, the first entry that may lie in it.
+    firsts: [u16; ROWS * PARTS],
+    /// Running sums of units over the entries of a row, after a zero; padded with all of them.
     ends: Box<[i16]>,
-    /// The cells of the entries, below the bits that tell how they lie.
-    cells: Box<[u16]>,
-    /// By cell.
-    pmf: Box<[f32]>,
+    /// The cells of the entries, above them the bits that tell how they lie, and above those the units of all entries of
+    /// the cell: one load for whoever draws it.
+    cells: Box<[u32]>,
+    /// All units of each cell.
+    units: Box<[u32]>,
     /// Sum of the weights.
     pub total: f32,
     /// Sum of what the weights would be if nothing else found the light.
@@ -34,13 +38,101 @@ pub(super) struct Place {
     pub at: [f32; 2],
     /// By what numbers run the plane's ways through it: [`SWAPPED`] if its first side runs along the plane's second axis,
     /// [`FIRST_BACK`] and [`SECOND_BACK`] if its sides run against the axes that they lie along.
-    pub lie: u16,
+    pub lie: u32,
 }
 
-pub(super) const SWAPPED: u16 = 1 << 13;
-pub(super) const FIRST_BACK: u16 = 1 << 14;
-pub(super) const SECOND_BACK: u16 = 1 << 15;
-const LIE: u16 = SWAPPED | FIRST_BACK | SECOND_BACK;
+/// Bits for the number of a cell.
+const CELL: u32 = 10;
+pub(super) const MOST_CELLS: usize = 1 << CELL;
+pub(super) const SWAPPED: u32 = 1 << CELL;
+pub(super) const FIRST_BACK: u32 = 2 << CELL;
+pub(super) const SECOND_BACK: u32 = 4 << CELL;
+const LIE: u32 = SWAPPED | FIRST_BACK | SECOND_BACK;
+/// Where the units begin: the rest is room enough for all of them.
+const ABOVE: u32 = CELL + 3;
+const _: () = assert!((ROWS as u64 * UNITS as u64) << ABOVE <= 1 << 32);
+/// The probability of a unit.
+const UNIT: f64 = 1.0 / (UNITS as f64 * ROWS as f64);
+
+/// A cell as far as it lies in a row.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Entry {
+    /// The units of the row that it begins with.
+    pub from: i16,
+    /// The first unit after it.
+    pub to: i16,
+    /// See [`Table::cells`].
+    cell: u32,
+}
+
+impl Entry {
+    /// The number of the cell.
+    #[inline(always)]
+    pub fn cell(self) -> usize {
+        self.cell as usize % MOST_CELLS
+    }
+
+    /// How it lies, see [`Place::lie`].
+    #[inline(always)]
+    pub fn lie(self) -> u32 {
+        self.cell & LIE
+    }
+
+    /// Units of the whole cell.
+    #[inline(always)]
+    pub fn units(self) -> u32 {
+        self.cell >> ABOVE
+    }
+}
+
+/// Where two numbers in [0, 1) fall among rows and units.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Spot {
+    pub row: i32,
+    pub unit: i32,
+    /// How far in its row and in units, both with what is left.
+    pub at: [f64; 2],
+}
+
+impl Spot {
+    /// The second finds a row, the first an entry of it.
+    #[inline(always)]
+    pub fn new(u: [f64; 2]) -> Self {
+        // Below the last end, rounding and all.
+        const MOST: f64 = 1.0 - 8.0 * f64::EPSILON;
+        let inside = |u: f64| if u < 0.0 { 0.0 } else { u };
+        let [x, y] = u.map(|u| if u > MOST { MOST } else { inside(u) });
+        let (x, y) = (x * f64::from(UNITS), y * ROWS as f64);
+        let (unit, row) = (whole(x), whole(y));
+        Spot { row, unit, at: [x, y - f64::from(row)] }
+    }
+}
+
+/// The whole part of a number in [0, 2^31), by way of the bits of 2^52 + x, which vectors have: a conversion as Rust
+/// defines it is done one by one.
+#[inline(always)]
+fn whole(x: f64) -> i32 {
+    const ONES: f64 = 4_503_599_627_370_496.0;
+    let rounded = x + ONES;
+    rounded.to_bits() as i32 - i32::from(rounded - ONES > x)
+}
+
+/// The probability of so many units.
+#[inline(always)]
+pub(super) fn probability(units: u32) -> f64 {
+    f64::from(units as i32) * UNIT
+}
+
+/// What is left of both numbers, in [0, 1], for the sides of a cell that lies so.
+#[inline(always)]
+pub(super) fn rest(at: [f64; 2], from: f64, width: f64, lie: u32) -> [f64; 2] {
+    let (x, y) = ((at[0] - from) / width, at[1]);
+    let swapped = lie & SWAPPED != 0;
+    let (a, b) = (if swapped { y } else { x }, if swapped { x } else { y });
+    let a = if lie & FIRST_BACK != 0 { 1.0 - a } else { a };
+    let b = if lie & SECOND_BACK != 0 { 1.0 - b } else { b };
+    [a, b]
+}
 
 /// What was found.
 #[derive(Debug, Clone, Copy)]
@@ -98,7 +190,7 @@ fn quantise(pieces: &[Piece], mut put: impl FnMut(u16, i16)) {
 }
 
 impl Table {
-    /// Of cells, at most 8192, with weights that are not negative. None if all weights are zero.
+    /// Of cells, at most [`MOST_CELLS`], with weights that are not negative. None if all weights are zero.
     pub fn new(weights: &[f32], places: &[Place]) -> Option<Box<Self>> {
         let along = |axis: usize| {
             move |a: &u16, b: &u16| {
@@ -109,71 +201,78 @@ impl Table {
         let mut order: Vec<u16> = (0..weights.len() as u16).filter(|i| weights[*i as usize] > 0.0).collect();
         order.sort_unstable_by(along(1));
         let mut rows = rows(&order, weights)?;
-        let mut starts = [0; ROWS + 1];
+        let mut firsts = [0; ROWS * PARTS];
         let (mut ends, mut cells, mut units) = (Vec::new(), Vec::new(), vec![0u32; weights.len()]);
-        for (start, row) in starts[1..].iter_mut().zip(&mut rows) {
+        for (firsts, row) in firsts.chunks_exact_mut(PARTS).zip(&mut rows) {
             row.sort_unstable_by(|a, b| along(0)(&a.cell, &b.cell));
+            ends.push(0);
+            let start = ends.len();
             let mut last = 0;
+            cells.push(0);
             quantise(row, |cell, end| {
                 ends.push(end);
-                cells.push(cell | places[cell as usize].lie);
+                cells.push(u32::from(cell) | places[cell as usize].lie);
                 units[cell as usize] += (end - last) as u32;
                 last = end;
             });
-            let padded = ends.len().next_multiple_of(LANES);
-            ends.resize(padded, UNITS);
-            cells.resize(padded, 0);
-            *start = padded as u16;
+            for (part, first) in (0..).zip(firsts) {
+                *first = (start + ends[start..].partition_point(|&end| end <= part << PART)) as u16;
+            }
+            // The last entry is never passed; those after it may be looked at with it.
+            ends.resize(ends.len() + AT_ONCE - 1, UNITS);
+            cells.resize(ends.len(), 0);
         }
+        cells.iter_mut().for_each(|cell| *cell |= units[*cell as usize % MOST_CELLS] << ABOVE);
         let total = order.iter().map(|&i| f64::from(weights[i as usize])).sum::<f64>() as f32;
-        let unit = 1.0 / (f64::from(UNITS) * ROWS as f64);
         Some(Box::new(Table {
-            starts,
+            firsts,
             ends: ends.into(),
             cells: cells.into(),
-            pmf: units.iter().map(|u| (f64::from(*u) * unit) as f32).collect(),
+            units: units.into(),
             total,
             whole: total,
             peaks: 0.0,
         }))
     }
 
-    /// The cell for two numbers in [0, 1): the second finds a row, the first an entry of it.
-    #[inline]
-    pub fn find(&self, u: [f64; 2]) -> Found {
-        // Below the last end, rounding and all.
-        let [x, y] = u.map(|v| v.clamp(0.0, 1.0 - 8.0 * f64::EPSILON));
-        let y = y * ROWS as f64;
-        let row = (y as usize).min(ROWS - 1);
-        let (start, end) = (self.starts[row] as usize, self.starts[row + 1] as usize);
-        let x = x * f64::from(UNITS);
-        let whole = x as i16;
-        let mut counts = [0i16; LANES];
-        for eight in self.ends[start..end].chunks_exact(LANES) {
-            for (count, e) in counts.iter_mut().zip(eight) {
-                *count += i16::from(*e <= whole);
+    /// The entry of a spot.
+    #[inline(always)]
+    pub fn entry(&self, row: i32, unit: i32) -> Entry {
+        let mut at = self.firsts[row as usize % ROWS * PARTS + (unit as usize >> PART) % PARTS] as usize;
+        loop {
+            // By signs: counted as truths they would be moved one by one.
+            let left: i16 = self.ends[at..at + AT_ONCE].iter().map(|end| (unit as i16 - end) >> 15).sum();
+            at = at + AT_ONCE - usize::from(left.unsigned_abs());
+            if left < 0 {
+                return Entry { from: self.ends[at - 1], to: self.ends[at], cell: self.cells[at] };
             }
         }
-        let before = counts.iter().sum::<i16>() as usize;
-        let entry = start + before;
-        let from = if before > 0 { self.ends[entry - 1] } else { 0 };
-        let x = (x - f64::from(from)) / f64::from(self.ends[entry] - from);
-        let y = y - row as f64;
-        let cell = self.cells[entry];
-        let [a, b] = if cell & SWAPPED == 0 { [x, y] } else { [y, x] };
-        let run = |u: f64, back: u16| if cell & back == 0 { u } else { 1.0 - u };
-        Found { cell: (cell & !LIE) as usize, u: [run(a, FIRST_BACK), run(b, SECOND_BACK)] }
+    }
+
+    /// The cell for two numbers in [0, 1).
+    #[inline]
+    pub fn find(&self, u: [f64; 2]) -> Found {
+        let spot = Spot::new(u);
+        let entry = self.entry(spot.row, spot.unit);
+        let from = f64::from(entry.from);
+        Found { cell: entry.cell(), u: rest(spot.at, from, f64::from(entry.to) - from, entry.lie()) }
     }
 
     /// The probability of a cell.
     #[inline]
     pub fn pmf(&self, cell: usize) -> f64 {
-        f64::from(self.pmf[cell])
+        probability(self.units(cell))
+    }
+
+    /// The units of a cell.
+    #[inline(always)]
+    pub fn units(&self, cell: usize) -> u32 {
+        self.units[cell]
     }
 
     /// Bytes held.
     pub fn memory(&self) -> usize {
-        size_of_val(self) + size_of_val(&*self.ends) + size_of_val(&*self.cells) + size_of_val(&*self.pmf)
+        size_of_val(self) + size_of_val(&*self.ends) + size_of_val(&*self.cells) + size_of_val(&*self.units)
     }
 }
 
@@ -192,10 +291,10 @@ mod tests {
             let weights: Vec<f32> =
                 (0..n).map(|i| if i % 5 == 3 { 0.0 } else { 10f32.powf(8.0 * rng.vec2().x - 4.0) }).collect();
             let places: Vec<Place> =
-                (0..n as u16).map(|i| Place { at: rng.vec2().to_array(), lie: (i % 8) * SWAPPED }).collect();
+                (0..n as u32).map(|i| Place { at: rng.vec2().to_array(), lie: (i % 8) * SWAPPED }).collect();
             let table = Table::new(&weights, &places).unwrap();
             let sum: f64 = (0..n).map(|i| table.pmf(i)).sum();
-            // Each an f32.
+            // Whole units.
             assert!((sum - 1.0).abs() < 1e-6, "{n}: {sum}");
             let total: f64 = weights.iter().map(|w| f64::from(*w)).sum();
             let unit = 1.0 / (ROWS as f64 * f64::from(UNITS));

@@ -101,6 +101,37 @@ fn what_a_surface_makes_of_it_is_drawn_as_the_density_says() {
     }
 }
 
+#[test]
+fn samples_drawn_together_are_those_drawn_one_by_one() {
+    each_sky(|what, sky| {
+        let light = light(sky, SkySampling::Product, 77.0);
+        let Some(guided) = light.guided() else { return };
+        let mut rng = TestRng::new(11);
+        let mut found = 0;
+        for (scattering, alone) in SCATTERINGS.into_iter().flat_map(|s| [(s, true), (s, false)]) {
+            for n in (1..=LANES).chain([LANES; 20]) {
+                let at = facing(rng.direction());
+                let mut guide = Guide::default();
+                let lobes = Lobes { wo: viewer(&mut rng, at.ns), scattering, alone };
+                if !guided.prepare(&at, &lobes, &mut guide) {
+                    continue;
+                }
+                let u: [[f32; LANES]; 2] = std::array::from_fn(|_| std::array::from_fn(|_| rng.f32()));
+                let all = guided.sample_many(&at, &guide, &u, n);
+                for k in 0..LANES {
+                    let one = guided.sample(&at, &guide, [u[0][k], u[1][k]]).filter(|_| k < n);
+                    assert_eq!(all.pdf[k], one.map_or(0.0, |l| l.pdf), "{what}: {k} of {n}, {guide:?}");
+                    if let Some(one) = one {
+                        assert_eq!(all.wi.get(k), one.wi, "{what}: {k} of {n}, {guide:?}");
+                        found += 1;
+                    }
+                }
+            }
+        }
+        assert!(found > 50, "{what}: {found}");
+    });
+}
+
 /// Relative variance of one sample of the light a surface sends to its viewer, all directions open.
 fn variance(light: &SkyLight, at: &Receiver, wo: Vec3, material: &dyn Fn(Vec3) -> f32) -> f64 {
     let mut rng = TestRng::new(4);
