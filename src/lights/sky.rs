@@ -364,10 +364,10 @@ impl GuidedLight for SkyLight {
     fn sample(&self, at: &Receiver, guide: &Guide, u: [f32; 2]) -> Option<LightSample> {
         let MapSampler::Product(table) = &self.map else { return None };
         let (wi, pdf) = match table.sample(guide, extend_unit(u))? {
-            Choice::Map { at: c, cell } => {
+            Choice::Map { at: c, density } => {
                 let (d, solid_angle) = self.sky.direction_and_density(c);
                 let w = self.turn.map_or(d, |t| t.to_world(d)).as_vec3();
-                let map = if solid_angle > 0.0 { table.density(guide, cell) / solid_angle } else { 0.0 };
+                let map = if solid_angle > 0.0 { density / solid_angle } else { 0.0 };
                 (w, (map + self.disc_density(table, guide, w)) as f32)
             }
             Choice::Disc { disc, u } => {
@@ -393,7 +393,7 @@ impl GuidedLight for SkyLight {
         }
         let c = self.locate(wi);
         let solid_angle = self.sky.solid_angle_density(c);
-        let map = if solid_angle > 0.0 { table.density(guide, table.cell_of(c)) / solid_angle } else { 0.0 };
+        let map = if solid_angle > 0.0 { table.density(guide, c) / solid_angle } else { 0.0 };
         (map + self.disc_density(table, guide, wi)) as f32
     }
     fn contrast(&self) -> f32 {

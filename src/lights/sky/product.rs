@@ -20,6 +20,7 @@
 //! light is scattered that nothing else finds.
 
 mod choose;
+mod inner;
 mod octahedron;
 mod partition;
 mod table;
@@ -93,8 +94,8 @@ pub(super) enum Choice {
     Map {
         /// On the charts.
         at: ChartPoint,
-        /// Number of the cell.
-        cell: usize,
+        /// Per u and v of the charts.
+        density: f64,
     },
     /// A disc, and two numbers for a place in it.
     Disc {
@@ -378,7 +379,11 @@ impl ProductTable {
         let found = self.table(number)?.find([x, u[1]]);
         let patches = self.partition.patches();
         Some(match patches.get(found.cell) {
-            Some(patch) => Choice::Map { at: self.partition.point(patch, found.u), cell: found.cell },
+            Some(_) => {
+                let (patch, part) = self.partition.within(found.cell, found.u);
+                let density = self.pmf(guide, found.cell) * patch.density;
+                Choice::Map { at: self.partition.point(patch, part), density }
+            }
             None => Choice::Disc { disc: found.cell - patches.len(), u: found.u },
         })
     }
@@ -393,16 +398,17 @@ impl ProductTable {
         (one(0) + one(1)) * f64::from(guide.worth)
     }
 
-    /// The density per u and v of the charts within a cell of the map.
+    /// The density per u and v of the charts at a point.
     #[inline]
-    pub fn density(&self, guide: &Guide, cell: usize) -> f64 {
-        self.pmf(guide, cell) * self.partition.patches()[cell].density
+    pub fn density(&self, guide: &Guide, at: ChartPoint) -> f64 {
+        let (cell, patch) = self.partition.find(at);
+        self.pmf(guide, cell) * patch.density
     }
 
     /// The cell of the map that a point lies in.
-    #[inline]
+    #[cfg(test)]
     pub fn cell_of(&self, at: ChartPoint) -> usize {
-        self.partition.find(at)
+        self.partition.find(at).0
     }
 
     /// The probability of a disc.

@@ -2,7 +2,7 @@
 //! arithmetic runs along columns, and what waits for memory waits together.
 
 use super::ProductTable;
-use super::partition::{Patch, Scale};
+use super::partition::{Partition, Patch, Scale};
 use super::table::{self, Spot, Table};
 use crate::base::directions::LANES;
 use crate::base::light::Guide;
@@ -28,6 +28,7 @@ pub(in super::super) struct Chosen {
 }
 
 struct Choose<'a> {
+    partition: &'a Partition,
     patches: &'a [Patch],
     scale: &'a Scale,
     tables: [&'a Table; 2],
@@ -45,7 +46,20 @@ struct Read {
     least: [[f32; LANES]; 2],
     span: [[f32; LANES]; 2],
     density: [f64; LANES],
+    chart: [u32; LANES],
     units: [[u32; LANES]; 2],
+}
+
+impl Read {
+    #[inline(always)]
+    fn patch(&mut self, k: usize, patch: &Patch) {
+        self.chart[k] = patch.chart;
+        self.density[k] = patch.density;
+        for axis in 0..2 {
+            self.least[axis][k] = patch.from[axis];
+            self.span[axis][k] = patch.span[axis];
+        }
+    }
 }
 
 impl ProductTable {
@@ -57,7 +71,7 @@ impl ProductTable {
             return Chosen::default();
         };
         let (patches, scale) = (self.partition.patches(), self.partition.scale());
-        dispatch(Choose { patches, scale, tables: [first, second], guide, u, n })
+        dispatch(Choose { partition: &self.partition, patches, scale, tables: [first, second], guide, u, n })
     }
 }
 
@@ -66,7 +80,7 @@ impl Kernel for Choose<'_> {
 
     #[inline(always)]
     fn run(self) -> Chosen {
-        let Choose { patches, scale, tables, guide, u, n } = self;
+        let Choose { partition, patches, scale, tables, guide, u, n } = self;
         let mut out = Chosen::default();
         let [mut x, mut y] = [[0.0; LANES]; 2];
         for k in 0..LANES {
@@ -101,6 +115,7 @@ impl Kernel for Choose<'_> {
             let spot = Spot::new([x[k], y[k]]);
             (row[k], unit[k], [x[k], y[k]]) = (spot.row, spot.unit, spot.at);
         }
+        let mut divided = 0u32;
         let mut read = Read { width: [1; LANES], ..Read::default() };
         for k in (0..n.min(LANES)).filter(|&k| taken[k] > 0.0) {
             let entry = tables[usize::from(second[k])].entry(row[k], unit[k]);
@@ -119,17 +134,21 @@ impl Kernel for Choose<'_> {
                 out.discs |= 1 << k;
                 continue;
             };
-            out.at.chart[k] = patch.chart;
-            for axis in 0..2 {
-                read.least[axis][k] = patch.from[axis];
-                read.span[axis][k] = patch.span[axis];
-            }
-            read.density[k] = patch.density;
+            read.patch(k, patch);
+            divided |= u32::from(patch.is_divided) << k;
         }
         for k in 0..LANES {
             let (from, width) = (f64::from(read.from[k]), f64::from(read.width[k]));
-            let part = table::rest([x[k], y[k]], from, width, read.lie[k]);
+            [out.part[0][k], out.part[1][k]] = table::rest([x[k], y[k]], from, width, read.lie[k]);
+        }
+        for k in (0..LANES).filter(|k| divided >> k & 1 == 1) {
+            let (patch, part) = partition.within(out.cell[k] as usize, out.part.map(|column| column[k]));
+            read.patch(k, patch);
             [out.part[0][k], out.part[1][k]] = part;
+        }
+        out.at.chart = read.chart;
+        for k in 0..LANES {
+            let part = out.part.map(|column| column[k]);
             out.at.u[k] = scale.at(0, read.least[0][k], read.span[0][k], part[0]);
             out.at.v[k] = scale.at(1, read.least[1][k], read.span[1][k], part[1]);
             let pmf = [0, 1].map(|t| table::probability(read.units[t][k]));

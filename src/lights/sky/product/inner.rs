@@ -5,7 +5,6 @@
 //! 1997), so that even numbers stay even.
 
 use super::partition::{Candidate, Patch, Rect, Sums};
-use crate::base::skybox::ChartGrid;
 use crate::lights::sky::plan::Level;
 use rayon::prelude::*;
 use std::collections::BinaryHeap;
@@ -74,6 +73,11 @@ impl Inner {
             patches.push(Patch { density: whole.density * probability, ..whole });
         }
         Inner { forks, patches }
+    }
+
+    /// Whether a cell has halves.
+    pub fn is_divided(&self, cell: usize) -> bool {
+        self.forks[cell].next != 0
     }
 
     /// What two numbers in [0, 1] lead to in a cell, and what is left of them.

@@ -1,9 +1,10 @@
 //! The charts of a sky cut into about a thousand cells, small where the light varies.
 //!
-//! Within a cell directions are drawn evenly over the chart, so what varies there is noise: cells are halved, the one that
-//! adds most to the variance first, until there are as many as a table holds.
+//! Tables choose among cells by what surfaces make of them; what varies within a cell is noise to them. So cells are halved,
+//! the one that adds most to the variance first, until there are as many as a table holds.
 
 use super::super::plan::Level;
+use super::inner::Inner;
 use crate::base::skybox::{ChartGrid, ChartPoint, Skybox};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -19,10 +20,10 @@ const OF_ANGLE: f64 = 1.0 / 6.0;
 
 /// A rectangle of cells of the finest grid.
 #[derive(Debug, Clone, Copy)]
-struct Rect {
-    chart: u32,
-    x: [u32; 2],
-    y: [u32; 2],
+pub(super) struct Rect {
+    pub chart: u32,
+    pub x: [u32; 2],
+    pub y: [u32; 2],
 }
 
 /// A rectangle's halves, or its number among the cells.
@@ -46,6 +47,7 @@ pub(in super::super) struct Partition {
     /// The same for those who draw from them.
     patches: Vec<Patch>,
     scale: Scale,
+    inner: Inner,
 }
 
 /// A cell as those who draw from it need it: half of a line of memory. In cells of the grid, which are fewer than f32 can
@@ -58,6 +60,8 @@ pub(in super::super) struct Patch {
     /// How much u and v span.
     pub span: [f32; 2],
     pub chart: u32,
+    /// Whether places in it are drawn by [`Partition::within`], and it has no density of its own.
+    pub is_divided: bool,
     /// One over the area on the charts.
     pub density: f64,
 }
@@ -89,10 +93,11 @@ impl Scale {
 }
 
 impl Patch {
-    fn new(rect: &Rect, grid: &ChartGrid) -> Self {
+    pub fn new(rect: &Rect, grid: &ChartGrid) -> Self {
         let span = [rect.x, rect.y].map(|[a, b]| (b - a) as f32);
         Patch {
             chart: rect.chart,
+            is_divided: false,
             from: [rect.x[0] as f32, rect.y[0] as f32],
             span,
             density: f64::from(grid.width) * f64::from(grid.height) / rect.cells(),
@@ -102,17 +107,17 @@ impl Patch {
 
 /// What a rectangle brings: luminance, the sum of its squares over the grid's cells, solid angle.
 #[derive(Debug, Clone, Copy, Default)]
-struct Sums {
-    flux: f64,
+pub(super) struct Sums {
+    pub flux: f64,
     squares: f64,
     angle: f64,
 }
 
 /// Waits to be halved.
-struct Candidate {
-    gain: f64,
-    node: u32,
-    rect: Rect,
+pub(super) struct Candidate {
+    pub gain: f64,
+    pub node: u32,
+    pub rect: Rect,
 }
 
 impl Ord for Candidate {
@@ -155,16 +160,18 @@ impl Sums {
 
     /// What a rectangle of `n` cells adds to the variance of one sample, up to a factor that all share: n sum f^2 / F is
     /// the second moment of light that arrives if it is chosen in proportion to its flux F, and F the square of the mean.
-    fn variance(&self, n: f64) -> f64 {
-        match self.flux > 0.0 {
-            true => (n * self.squares / self.flux - self.flux).max(0.0) + OF_ANGLE * self.angle * self.flux,
-            false => 0.0,
-        }
+    pub fn spread(&self, n: f64) -> f64 {
+        if self.flux > 0.0 { (n * self.squares / self.flux - self.flux).max(0.0) } else { 0.0 }
+    }
+
+    /// The same with that of what surfaces make of it, at so much a steradian.
+    fn variance(&self, n: f64, of_angle: f64) -> f64 {
+        self.spread(n) + of_angle * self.angle * self.flux
     }
 }
 
 impl Rect {
-    fn cells(&self) -> f64 {
+    pub fn cells(&self) -> f64 {
         f64::from(self.x[1] - self.x[0]) * f64::from(self.y[1] - self.y[0])
     }
 
@@ -191,7 +198,7 @@ impl Rect {
     }
 
     /// The halves that leave less variance, and how much each leaves; None if it is one cell.
-    fn halve(&self, level: &Level) -> Option<Halves> {
+    pub fn halve(&self, level: &Level, of_angle: f64) -> Option<Halves> {
         let quarters = self.quarters(level);
         let [mx, my] = self.middle();
         let whole = |a: usize, b: usize| {
@@ -209,8 +216,8 @@ impl Rect {
                 false => Rect { y: if k == 0 { [ends[0], at] } else { [at, ends[1]] }, ..*self },
             };
             let parts = [part(0), part(1)];
-            let variances = [0, 1].map(|k| sums[k].variance(parts[k].cells()));
-            (at > ends[0]).then_some(Halves { along_x, at, parts, variances })
+            let variances = [0, 1].map(|k| sums[k].variance(parts[k].cells(), of_angle));
+            (at > ends[0]).then_some(Halves { along_x, at, parts, sums, variances })
         };
         let left = |h: &Halves| h.variances[0] + h.variances[1];
         let both = [candidate(true), candidate(false)];
@@ -218,7 +225,7 @@ impl Rect {
     }
 
     /// The sums over all of it.
-    fn sums(&self, level: &Level) -> Sums {
+    pub fn sums(&self, level: &Level) -> Sums {
         let mut all = Sums::default();
         self.quarters(level).iter().for_each(|q| all.add(q));
         all
@@ -237,10 +244,13 @@ impl Rect {
     }
 }
 
-struct Halves {
-    along_x: bool,
-    at: u32,
-    parts: [Rect; 2],
+/// Two halves of a rectangle.
+pub(super) struct Halves {
+    pub along_x: bool,
+    /// The first of the second half's columns or rows.
+    pub at: u32,
+    pub parts: [Rect; 2],
+    pub sums: [Sums; 2],
     variances: [f64; 2],
 }
 
@@ -272,7 +282,7 @@ impl Partition {
             Rect { chart: chart as u32, x: span(column, grid.width, across), y: span(y, grid.height, down) }
         };
         let rects: Vec<Rect> = (0..blocks).map(block).collect();
-        let gains: Vec<f64> = rects.par_iter().map(|r| r.sums(level).variance(r.cells())).collect();
+        let gains: Vec<f64> = rects.par_iter().map(|r| r.sums(level).variance(r.cells(), OF_ANGLE)).collect();
         let mut heap: BinaryHeap<Candidate> = (0..)
             .zip(rects.iter().zip(&gains))
             .map(|(node, (&rect, &gain))| Candidate { gain, node, rect })
@@ -282,7 +292,7 @@ impl Partition {
         let mut count = blocks;
         while count < most {
             let Some(c) = heap.pop().filter(|c| c.gain > 0.0) else { break };
-            let Some(halves) = c.rect.halve(level) else { continue };
+            let Some(halves) = c.rect.halve(level, OF_ANGLE) else { continue };
             let first = nodes.len() as u32;
             nodes[c.node as usize] =
                 if halves.along_x { Node::X(halves.at, first) } else { Node::Y(halves.at, first) };
@@ -300,8 +310,10 @@ impl Partition {
                 cells.push(rect);
             }
         }
-        let patches = cells.iter().map(|r| Patch::new(r, &grid)).collect();
-        Partition { grid, across, down, nodes, cells, patches, scale: Scale::new(&grid) }
+        let inner = Inner::new(level, &cells);
+        let patch = |(i, rect)| Patch { is_divided: inner.is_divided(i), ..Patch::new(rect, &grid) };
+        let patches = cells.iter().enumerate().map(patch).collect();
+        Partition { grid, across, down, nodes, cells, patches, scale: Scale::new(&grid), inner }
     }
 
     /// All cells.
@@ -322,16 +334,29 @@ impl Partition {
         ChartPoint { chart: patch.chart, u, v }
     }
 
-    /// The number of the cell that a point lies in.
+    /// The part of a cell that two numbers in [0, 1] lead to, and what is left of them.
     #[inline]
-    pub fn find(&self, at: ChartPoint) -> usize {
+    pub fn within(&self, cell: usize, part: [f64; 2]) -> (&Patch, [f64; 2]) {
+        let patch = &self.patches[cell];
+        if patch.is_divided { self.inner.draw(cell, part) } else { (patch, part) }
+    }
+
+    /// The number of the cell that a point lies in, and the part of the cell.
+    #[inline]
+    pub fn find(&self, at: ChartPoint) -> (usize, &Patch) {
         let cell = |u: f64, n: u32| ((u * f64::from(n)) as u32).min(n - 1);
         let (x, y) = (cell(at.u, self.grid.width), cell(at.v, self.grid.height));
         let row = at.chart as usize * self.down + part_of(y, self.grid.height, self.down);
         let mut node = row * self.across + part_of(x, self.grid.width, self.across);
         loop {
             node = match self.nodes[node] {
-                Node::Cell(number) => return number as usize,
+                Node::Cell(number) => {
+                    let patch = &self.patches[number as usize];
+                    return match patch.is_divided {
+                        true => (number as usize, self.inner.find(number as usize, [x, y])),
+                        false => (number as usize, patch),
+                    };
+                }
                 Node::X(at, first) => first as usize + usize::from(x >= at),
                 Node::Y(at, first) => first as usize + usize::from(y >= at),
             };
@@ -384,6 +409,7 @@ impl Partition {
 
     /// Bytes held.
     pub fn memory(&self) -> u64 {
-        (size_of_val(&*self.nodes) + size_of_val(&*self.cells) + size_of_val(&*self.patches)) as u64
+        let own = size_of_val(&*self.nodes) + size_of_val(&*self.cells) + size_of_val(&*self.patches);
+        own as u64 + self.inner.memory()
     }
 }

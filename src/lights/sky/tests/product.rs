@@ -41,7 +41,7 @@ fn probabilities_of_all_cells_and_discs_sum_to_one() {
                 let u = ((i % w) as f64 + 0.5) / w as f64;
                 let v = ((i / w % h) as f64 + 0.5) / h as f64;
                 let c = ChartPoint { chart: (i / (w * h)) as u32, u, v };
-                table.density(&guide, table.cell_of(c)) / (w * h) as f64
+                table.density(&guide, c) / (w * h) as f64
             });
             let discs = (0..light.discs.len()).map(|d| table.disc_pmf(&guide, d));
             let sum = map.sum::<f64>() + discs.sum::<f64>();
@@ -77,9 +77,9 @@ fn what_a_surface_makes_of_it_is_drawn_as_the_density_says() {
             let mut counts = vec![0.0; none + 1];
             for _ in 0..n {
                 let cell = match table.sample(&guide, extend_unit(rng.vec2().to_array())) {
-                    Some(Choice::Map { at, cell }) => {
-                        assert_eq!(table.cell_of(at), cell);
-                        cell
+                    Some(Choice::Map { at, density }) => {
+                        assert_eq!(density, table.density(&guide, at));
+                        table.cell_of(at)
                     }
                     Some(Choice::Disc { disc, .. }) => map + disc,
                     None => none,
@@ -108,11 +108,11 @@ fn samples_drawn_together_are_those_drawn_one_by_one() {
         let Some(guided) = light.guided() else { return };
         let mut rng = TestRng::new(11);
         let mut found = 0;
-        for (scattering, alone) in SCATTERINGS.into_iter().flat_map(|s| [(s, true), (s, false)]) {
+        for (scattering, alone, samples) in ways() {
             for n in (1..=LANES).chain([LANES; 20]) {
                 let at = facing(rng.direction());
                 let mut guide = Guide::default();
-                let lobes = Lobes { wo: viewer(&mut rng, at.ns), scattering, alone };
+                let lobes = Lobes { wo: viewer(&mut rng, at.ns), scattering, alone, samples };
                 if !guided.prepare(&at, &lobes, &mut guide) {
                     continue;
                 }
@@ -171,6 +171,19 @@ fn an_open_diffuse_surface_hardly_varies() {
     let (product, table) = (of(SkySampling::Product), of(SkySampling::Table));
     // What is left is the cosine within cells of 11 degrees or less.
     assert!(product < 0.12 && product < 0.2 * table, "{product} {table}");
+}
+
+#[test]
+fn stars_are_found_within_cells() {
+    // More stars than there are cells, 300 times as bright as the night between them; half of the light is theirs.
+    let star = |i: usize| if i * 2_654_435_761 % 4096 < 14 { 30.0 } else { 0.1 };
+    let sky = sky("sphere", picture(1024, 512, star));
+    let n = Vec3::new(0.6, 0.64, -0.48);
+    let (at, f) = (facing(n), |w: Vec3| 0.3 * w.dot(n).max(0.0));
+    let product = variance(&light(&sky, SkySampling::Product, 0.0), &at, n, &f);
+    // Evenly within cells it would be 0.5 * (30 / 0.2) = 75 and more. A star's bilinear filter alone, of twice its texel's
+    // width, leaves about 0.5 * (1.78 - 1) + 0.5 * (2 - 1).
+    assert!(product < 3.0, "{product}");
 }
 
 #[test]
