@@ -81,8 +81,8 @@ impl Kernel for Values<'_> {
             let value = [0, 1, 2].map(|c| beta[c] * bsdf.f_cos[c][k]);
             let black = (value[0] == 0.0) & (value[1] == 0.0) & (value[2] == 0.0);
             out.any[k] = (local.z[k] != 0.0) & !black;
-            for c in 0..3 {
-                out.value[c][k] = value[c] * factor;
+            for (column, value) in out.value.iter_mut().zip(value) {
+                column[k] = value * factor;
             }
         }
         out

@@ -262,11 +262,11 @@ impl Kernel for Few {
 /// A loop of known length, which vectors do at once: they are wider than what [`FillPixel`] would leave over.
 #[inline(always)]
 fn few(point: impl Fn(u32) -> [u32; 2]) -> [[f32; 8]; 2] {
-    let mut out = [[0.0; 8]; 2];
-    for i in 0..8 {
-        [out[0][i], out[1][i]] = point(i as u32).map(to_unit_f32);
+    let [mut x, mut y] = [[0.0; 8]; 2];
+    for ((x, y), i) in x.iter_mut().zip(&mut y).zip(0..) {
+        [*x, *y] = point(i).map(to_unit_f32);
     }
-    out
+    [x, y]
 }
 
 struct FillPaths<'a> {

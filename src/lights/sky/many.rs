@@ -72,9 +72,9 @@ impl Kernel for Place<'_> {
         for (i, disc) in discs.iter().enumerate() {
             let mut inside = [false; LANES];
             let mut any = false;
-            for k in 0..LANES {
-                inside[k] = disc.contains(out.wi.get(k));
-                any |= inside[k];
+            for (k, inside) in inside.iter_mut().enumerate() {
+                *inside = disc.contains(out.wi.get(k));
+                any |= *inside;
             }
             if any {
                 let density = table.disc_pmf(guide, i) * f64::from(warp::uniform_cone_pdf(disc.m));
@@ -83,10 +83,10 @@ impl Kernel for Place<'_> {
                 }
             }
         }
-        for k in 0..LANES {
+        for (k, of_discs) in of_discs.into_iter().enumerate() {
             let density = chosen.density[k];
             let map = if toward.density[k] > 0.0 { density / toward.density[k] } else { 0.0 };
-            let pdf = (map + of_discs[k]) as f32;
+            let pdf = (map + of_discs) as f32;
             // What was not taken has no density, though a disc may be there.
             let seen = (out.wi.get(k).dot(ng) >= 0.0) & (density > 0.0);
             out.pdf[k] = if seen { pdf } else { 0.0 };

@@ -118,8 +118,8 @@ fn samples_drawn_together_are_those_drawn_one_by_one() {
                 }
                 let u: [[f32; LANES]; 2] = std::array::from_fn(|_| std::array::from_fn(|_| rng.f32()));
                 let all = guided.sample_many(&at, &guide, &u, n);
-                for k in 0..LANES {
-                    let one = guided.sample(&at, &guide, [u[0][k], u[1][k]]).filter(|_| k < n);
+                for (k, (&x, &y)) in u[0].iter().zip(&u[1]).enumerate() {
+                    let one = guided.sample(&at, &guide, [x, y]).filter(|_| k < n);
                     assert_eq!(all.pdf[k], one.map_or(0.0, |l| l.pdf), "{what}: {k} of {n}, {guide:?}");
                     if let Some(one) = one {
                         assert_eq!(all.wi.get(k), one.wi, "{what}: {k} of {n}, {guide:?}");
