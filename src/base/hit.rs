@@ -5,7 +5,7 @@ pub const NO_PRIMITIVE: u32 = u32::MAX;
 
 /// A hit as a kernel gives it. `t` is provisional: the shape's `refine` computes the point again in shared code,
 /// so that two kernels that find the same primitive give the same bits.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Hit {
     /// Provisional distance in lengths of the ray's direction.
     pub t: f32,

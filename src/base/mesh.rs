@@ -46,6 +46,14 @@ impl TriangleMesh {
         [vertex(a), vertex(b), vertex(c)]
     }
 
+    /// The shading normals at the corners of a triangle, which must not be flat.
+    #[inline]
+    pub fn corner_normals(&self, triangle: u32) -> [glam::Vec3; 3] {
+        let [a, b, c] = self.indices[triangle as usize];
+        let normal = |i: u32| glam::Vec3::from_array(self.normals[i as usize]);
+        [normal(a), normal(b), normal(c)]
+    }
+
     /// Bytes of all arrays.
     pub fn memory(&self) -> u64 {
         (size_of_val(&self.positions[..])

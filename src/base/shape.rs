@@ -1,5 +1,7 @@
 //! Geometry in the space of its group: bounds, tests, the surface at a hit, sampling.
 
+use crate::base::hit::Hit;
+use crate::base::lanes::{LANES, LocalRays, Surfaces};
 use crate::base::mesh::TriangleMesh;
 use crate::error::Result;
 use crate::math::aabb::{Aabb, DAabb};
@@ -105,6 +107,13 @@ pub trait Shape: Send + Sync {
     /// kernel's own t: fixed operations in a fixed order from the ray and the primitive alone. `hint` is that t,
     /// for choosing between several crossings only.
     fn refine(&self, ray: &LocalRay, prim: u32, hint: f32, needs: Needs) -> Surface;
+
+    /// As [`Shape::refine`], bit for bit, of at most [`LANES`] hits, one a lane; `out` is set in as many lanes.
+    fn refine_batch(&self, rays: &LocalRays, hits: &[Hit], needs: Needs, out: &mut Surfaces) {
+        for (lane, hit) in hits.iter().enumerate().take(LANES) {
+            out.set(lane, &self.refine(&rays.get(lane), hit.prim, hit.t, needs));
+        }
+    }
 
     /// Which of its object's materials a primitive has.
     fn material_slot(&self, _prim: u32) -> usize {

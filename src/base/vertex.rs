@@ -2,6 +2,7 @@
 
 use crate::base::geometry::Placement;
 use crate::base::hit::Hit;
+use crate::base::lanes::choose;
 use crate::base::light::Receiver;
 use crate::base::ray::Ray;
 use crate::base::shape::{LocalRay, Surface};
@@ -59,36 +60,26 @@ pub struct Origin {
 impl Vertex {
     /// From a surface in the space of its group, the group's placement, and the ray that met it.
     pub fn new(ray: &Ray, surface: &Surface, placement: Option<&Placement>, origin: Origin) -> Self {
-        let (p, error, ng, ns, lift) = match placement {
-            None => (surface.p, surface.error, surface.ng, surface.ns, surface.lift),
-            Some(pl) => placed(surface, pl),
-        };
+        let Surface { p, error, ng, ns, lift, .. } = *surface;
+        let body = Body { p, error, ng, ns, lift };
+        let body = placement.map_or(body, |pl| placed(&body, pl));
         let d = ray.d.as_dvec3();
-        let length = d.length();
-        let ng = ng.normalize();
-        let wo = -d / length;
-        // Seen from a side on which the interpolated normal turns away (at silhouettes), no frame around it has the
-        // viewer and the light on consistent sides: there the geometric normal stands in, and nothing turns black.
-        let smooth = surface.ns != surface.ng && ns.dot(wo) * ng.dot(wo) > 0.0;
-        let ns = if smooth { ns.normalize() } else { ng };
-        let p32 = p.as_vec3();
-        // The rounding of p itself to f32.
-        let error = error + p.abs() * UNIT_ROUNDOFF;
+        let f = facing(d, &body);
         let [dpdu, dpdv] = match placement {
             None => [surface.dpdu, surface.dpdv],
             Some(pl) => [surface.dpdu, surface.dpdv].map(|v| pl.to_render.matrix3 * v),
         };
-        let footprint = texture_footprint([dpdu, dpdv], origin.spread as f64 * surface.t * length);
+        let footprint = texture_footprint([dpdu, dpdv], origin.spread as f64 * surface.t * d.length());
         Vertex {
-            p: p32,
-            error: round_up(error),
-            ng: ng.as_vec3(),
-            frame: frame_along(ns.as_vec3(), dpdu),
-            wo: wo.as_vec3(),
+            p: f.p,
+            error: f.error,
+            ng: f.ng,
+            frame: frame_along(f.ns, dpdu),
+            wo: f.wo,
             uv: surface.uv,
             footprint,
             t: surface.t as f32,
-            lift: lift.as_vec3(),
+            lift: f.lift,
             path: origin.hit.path,
             prim: origin.hit.prim,
             object: origin.object,
@@ -166,11 +157,53 @@ pub fn local_ray(ray: &Ray, placement: Option<&Placement>) -> LocalRay {
     LocalRay { o, d, tnear: ray.tnear as f64, tfar: ray.tfar as f64 }
 }
 
-type PlacedSurface = (DVec3, DVec3, DVec3, DVec3, DVec3);
+/// The part of a [`Surface`] that every vertex is made from, in the space of its group or in render space.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Body {
+    pub p: DVec3,
+    pub error: DVec3,
+    pub ng: DVec3,
+    pub ns: DVec3,
+    pub lift: DVec3,
+}
+
+/// A [`Body`] as a ray sees it: the fields of [`Vertex`].
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Facing {
+    pub p: Vec3,
+    pub error: Vec3,
+    pub ng: Vec3,
+    pub ns: Vec3,
+    pub wo: Vec3,
+    pub lift: Vec3,
+}
+
+/// What a ray in direction `d` sees of a body in render space. Without a branch, for loops over many.
+#[inline(always)]
+pub(super) fn facing(d: DVec3, s: &Body) -> Facing {
+    let ng = s.ng.normalize();
+    let wo = -d / d.length();
+    // Seen from a side on which the interpolated normal turns away (at silhouettes), no frame around it has the
+    // viewer and the light on consistent sides: there the geometric normal stands in, and nothing turns black.
+    let differs = (s.ns.x != s.ng.x) | (s.ns.y != s.ng.y) | (s.ns.z != s.ng.z);
+    let smooth = differs & (s.ns.dot(wo) * ng.dot(wo) > 0.0);
+    let ns = choose(smooth, s.ns.normalize(), ng);
+    // The rounding of p itself to f32.
+    let error = s.error + s.p.abs() * UNIT_ROUNDOFF;
+    Facing {
+        p: s.p.as_vec3(),
+        error: round_up(error),
+        ng: ng.as_vec3(),
+        ns: ns.as_vec3(),
+        wo: wo.as_vec3(),
+        lift: s.lift.as_vec3(),
+    }
+}
 
 /// Carries a surface through its placement. A kernel transforms rays in f32, so its idea of where the surface is
 /// is off by four roundings (three products, their sum) of |M^-1| |p| + |t|: that is carried back by |M| and added.
-fn placed(s: &Surface, pl: &Placement) -> PlacedSurface {
+#[inline(always)]
+pub(super) fn placed(s: &Body, pl: &Placement) -> Body {
     let m = pl.to_render.matrix3;
     let p = pl.to_render.transform_point3(s.p);
     let back = abs(pl.from_render.matrix3) * p.abs() + pl.from_render.translation.abs();
@@ -180,13 +213,15 @@ fn placed(s: &Surface, pl: &Placement) -> PlacedSurface {
         + (abs(m) * s.p.abs() + pl.to_render.translation.abs()) * (4.0 * UNIT_ROUNDOFF * 1.01);
     // Normals go by the inverse transpose; a mirroring placement keeps outward outward this way.
     let normals = pl.from_render.matrix3.transpose();
-    (p, error, normals * s.ng, normals * s.ns, m * s.lift)
+    Body { p, error, ng: normals * s.ng, ns: normals * s.ns, lift: m * s.lift }
 }
 
+#[inline(always)]
 fn abs(m: DMat3) -> DMat3 {
     DMat3::from_cols(m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs())
 }
 
+#[inline(always)]
 fn round_up(v: DVec3) -> Vec3 {
     // One rounding up at most; 1 + 2 epsilon covers it.
     v.as_vec3() * (1.0 + 2.0 * f32::EPSILON)
@@ -202,14 +237,14 @@ fn step(x: f32, n: f32) -> f32 {
 }
 
 /// The shading frame: its x follows `dpdu` where that is known, so that stretched highlights do.
-fn frame_along(n: Vec3, dpdu: DVec3) -> Frame {
+pub(super) fn frame_along(n: Vec3, dpdu: DVec3) -> Frame {
     let along = dpdu.try_normalize().and_then(|u| Frame::from_zx(n, u.as_vec3()));
     along.unwrap_or_else(|| Frame::from_z(n))
 }
 
 /// Width of a ray's footprint in uv units: its width in space over the longer tangent. Isotropic and without the
 /// obliquity of the surface, so never wider than the truth.
-fn texture_footprint(tangents: [DVec3; 2], width: f64) -> f32 {
+pub(super) fn texture_footprint(tangents: [DVec3; 2], width: f64) -> f32 {
     let scale = tangents[0].length_squared().max(tangents[1].length_squared());
     if scale > 0.0 { (width / scale.sqrt()) as f32 } else { 0.0 }
 }

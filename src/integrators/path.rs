@@ -6,7 +6,7 @@ use super::escapes::Escapes;
 use super::pending::Pending;
 use super::points::VertexPoints;
 use super::strategy::{Strategies, Strategy};
-use super::surface::Surface;
+use super::surface::{LastLook, Surface};
 use super::{CameraBatch, FirstHit, Integrator, PathResults, PilotPlan, Specialised, Workspace, pilot};
 use crate::base::hit::{HitBatch, NO_PRIMITIVE};
 use crate::base::light::Receiver;
@@ -14,9 +14,10 @@ use crate::base::material::Prepared;
 use crate::base::ray::{Coherence, RayBatch};
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::base::vertex::Vertex;
+use crate::base::vertices::Vertices;
 use crate::color::Rgb;
 use crate::error::Result;
-use crate::scene::Scene;
+use crate::scene::{Meetings, Scene};
 use glam::Vec3;
 use std::sync::Arc;
 
@@ -247,32 +248,29 @@ impl PathTracer {
         paths.sort_out(&work.hits, rays);
         paths.escapes.add_background(scene, &mut out.li);
         paths.draw(&block, self.light_sampling, |_, i| i);
-        let mut surfaces = Vec::with_capacity(Surface::AT_ONCE);
-        for first in (0..paths.hits.len()).step_by(Surface::AT_ONCE) {
-            surfaces.clear();
-            for (k, &i) in paths.chunk(first) {
-                let i = i as usize;
-                let Some(hit) = work.hits.get(i) else { continue };
-                let v = scene.vertex(&rays.get(i), hit, batch.spread);
-                let from = Receiver { p: v.p, ng: Vec3::ZERO, ns: Vec3::ZERO };
-                let state = PathState {
-                    beta: Rgb::WHITE,
-                    pdf: f32::INFINITY,
-                    from,
-                    guided_pdf: 0.0,
-                    eta2: 1.0,
-                    index: i as u32,
-                };
-                surfaces.push(Surface::new(scene, v, state, k));
+        let mut some = Together::default();
+        loop {
+            let met = Meetings { rays, hits: &work.hits, spread: batch.spread };
+            some.next(scene, &met, &paths.hits, |index, v| PathState {
+                beta: Rgb::WHITE,
+                pdf: f32::INFINITY,
+                from: Receiver { p: v.p, ng: Vec3::ZERO, ns: Vec3::ZERO },
+                guided_pdf: 0.0,
+                eta2: 1.0,
+                index,
+            });
+            let surfaces = &mut some.surfaces;
+            if surfaces.is_empty() {
+                break;
             }
-            for s in &surfaces {
+            for s in surfaces.iter() {
                 out.alpha[s.state.index as usize] = 1.0;
                 if batch.want_first {
                     out.first[s.state.index as usize] = Some(first_hit(scene, s.v));
                 }
                 block.add_emission(&s.state, &s.v, -s.v.wo, out);
             }
-            self.scatter(&block, &mut surfaces, work, paths);
+            self.scatter(&block, surfaces, work, paths);
             block.resolve_many(work, paths, out);
         }
         block.resolve_shadows(work, paths, out);
@@ -296,24 +294,59 @@ impl PathTracer {
         if goes_on {
             paths.draw(block, self.light_sampling, |states, i| states[i as usize].index);
         }
-        let mut surfaces = Vec::with_capacity(Surface::AT_ONCE);
-        for first in (0..paths.hits.len()).step_by(Surface::AT_ONCE) {
-            surfaces.clear();
-            for (k, &i) in paths.chunk(first) {
-                let i = i as usize;
-                let Some(hit) = work.hits.get(i) else { continue };
-                let v = block.scene.vertex(&rays.get(i), hit, 0.0);
-                surfaces.push(Surface::new(block.scene, v, paths.states[i], k));
+        let mut some = Together::default();
+        loop {
+            let met = Meetings { rays, hits: &work.hits, spread: 0.0 };
+            some.next(block.scene, &met, &paths.hits, |i, _| paths.states[i as usize]);
+            let surfaces = &mut some.surfaces;
+            if surfaces.is_empty() {
+                break;
             }
-            for s in &surfaces {
+            for s in surfaces.iter() {
                 block.add_emission(&s.state, &s.v, -s.v.wo, out);
             }
             if goes_on {
-                self.scatter(block, &mut surfaces, work, paths);
+                self.scatter(block, surfaces, work, paths);
                 block.resolve_many(work, paths, out);
             }
         }
         block.resolve_shadows(work, paths, out);
+    }
+}
+
+/// The surface points of a depth, a few at a time.
+#[derive(Default)]
+struct Together<'a> {
+    surfaces: Vec<Surface<'a>>,
+    vertices: Vertices,
+    look: LastLook<'a>,
+    /// Hits whose points have been here.
+    done: usize,
+}
+
+impl<'a> Together<'a> {
+    /// Goes on to the next of the hits, to none at their end. `state` tells the path of a ray.
+    #[inline]
+    fn next(
+        &mut self,
+        scene: &'a Scene,
+        met: &Meetings,
+        hits: &[u32],
+        state: impl Fn(u32, &Vertex) -> PathState,
+    ) {
+        self.surfaces.clear();
+        self.surfaces.reserve(Surface::AT_ONCE);
+        let end = hits.len().min(self.done + Surface::AT_ONCE);
+        while self.done < end {
+            let which = &hits[self.done..end];
+            let n = scene.vertices(met, which, &mut self.vertices);
+            // By an iterator of known length, each is made where it stays.
+            self.surfaces.extend(which[..n].iter().enumerate().map(|(lane, &i)| {
+                let v = self.vertices.get(lane);
+                Surface::new(scene, &mut self.look, v, state(i, &v), self.done + lane)
+            }));
+            self.done += n;
+        }
     }
 }
 
@@ -334,11 +367,6 @@ impl PathScratch {
     fn draw(&mut self, block: &Block, with_light: bool, path_of: impl Fn(&[PathState], u32) -> u32) {
         let paths = self.hits.iter().map(|&i| path_of(&self.states, i));
         self.points.draw(block.ids, paths, block.depth, with_light);
-    }
-
-    /// The next few hits from `first` on, with their numbers.
-    fn chunk(&self, first: usize) -> impl Iterator<Item = (usize, &u32)> {
-        self.hits.iter().enumerate().skip(first).take(Surface::AT_ONCE)
     }
 
     fn begin(&mut self, next: &mut RayBatch, shadow: &mut RayBatch) {

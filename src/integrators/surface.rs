@@ -1,7 +1,7 @@
 //! What happens at the surface points of one depth: a light sample each, then the direction in which the path goes on.
 //!
-//! A few points are worked on at once, stage by stage: the form that lights and shapes with a batch of their own would
-//! need. By itself it is no faster than one point after the other (measured).
+//! A few points are worked on at once, stage by stage: the form that shapes need, which work out several points in
+//! vector code. By itself it is no faster than one point after the other (measured).
 
 use super::Workspace;
 use super::depth::Block;
@@ -9,6 +9,7 @@ use super::path::{PathScratch, PathState, PathTracer};
 use super::pending::Pending;
 use super::points::VertexPoint;
 use super::{PathId, light_dim};
+use crate::base::lanes::LANES;
 use crate::base::light::{ChosenLight, LightSample, Receiver};
 use crate::base::material::{Material, Prepared, Transmission};
 use crate::base::vertex::Vertex;
@@ -27,7 +28,7 @@ pub(super) struct Surface<'a> {
     /// Its number among the hits of the depth.
     pub(super) number: usize,
     pub(super) material: &'a dyn Material,
-    transmission: Option<Transmission>,
+    look: Look,
     pub(super) prepared: Prepared,
     /// Local direction to the viewer.
     pub(super) wo: Vec3,
@@ -35,28 +36,56 @@ pub(super) struct Surface<'a> {
     lit: Option<(ChosenLight, LightSample)>,
 }
 
+/// What is the same for all points of a material: asked for once, not at each.
+#[derive(Clone, Copy)]
+struct Look {
+    transmission: Option<Transmission>,
+    is_black: bool,
+    is_delta: bool,
+    picks_lobe: bool,
+}
+
+/// The material of the last point.
+#[derive(Default)]
+pub(super) struct LastLook<'a>(Option<(u32, u32, &'a dyn Material, Look)>);
+
+impl<'a> LastLook<'a> {
+    #[inline(always)]
+    fn of(&mut self, scene: &'a Scene, v: &Vertex) -> (&'a dyn Material, Look) {
+        if let Some((object, slot, material, look)) = self.0
+            && (object, slot) == (v.object, v.slot)
+        {
+            return (material, look);
+        }
+        let material = scene.material(v);
+        let look = Look {
+            transmission: material.transmission(),
+            is_black: material.is_black(),
+            is_delta: material.is_delta(),
+            picks_lobe: material.picks_lobe(),
+        };
+        self.0 = Some((v.object, v.slot, material, look));
+        (material, look)
+    }
+}
+
 impl<'a> Surface<'a> {
     /// Points worked on at once: few enough for the first-level cache.
-    pub const AT_ONCE: usize = 16;
+    pub const AT_ONCE: usize = LANES;
 
     /// A point whose material is still to be read.
-    #[inline]
-    pub fn new(scene: &'a Scene, v: Vertex, state: PathState, number: usize) -> Self {
-        let material = scene.material(&v);
+    #[inline(always)]
+    pub fn new(
+        scene: &'a Scene,
+        last: &mut LastLook<'a>,
+        v: Vertex,
+        state: PathState,
+        number: usize,
+    ) -> Self {
+        let (material, look) = last.of(scene, &v);
         let wo = v.frame.to_local(v.wo);
-        let transmission = material.transmission();
-        let receiver = if transmission.is_some() { v.receiver_all_round() } else { v.receiver() };
-        Surface {
-            v,
-            state,
-            number,
-            material,
-            transmission,
-            prepared: Prepared::default(),
-            wo,
-            receiver,
-            lit: None,
-        }
+        let receiver = if look.transmission.is_some() { v.receiver_all_round() } else { v.receiver() };
+        Surface { v, state, number, material, look, prepared: Prepared::default(), wo, receiver, lit: None }
     }
 }
 
@@ -70,7 +99,7 @@ impl PathTracer {
         paths: &mut PathScratch,
     ) {
         let all = surfaces.len();
-        surfaces.retain(|s| !s.material.is_black());
+        surfaces.retain(|s| !s.look.is_black);
         let black = (all - surfaces.len()) as u64;
         let shadow_rays = block.shadow_rays();
         work.avoided.points += all as u64;
@@ -88,11 +117,11 @@ impl PathTracer {
         }
         let before = work.shadow.len();
         if self.light_sampling && block.each_light {
-            for s in surfaces.iter().filter(|s| !s.material.is_delta()) {
+            for s in surfaces.iter().filter(|s| !s.look.is_delta) {
                 block.ask_each(s, work, paths);
             }
         } else if self.light_sampling {
-            for s in surfaces.iter_mut().filter(|s| !s.material.is_delta()) {
+            for s in surfaces.iter_mut().filter(|s| !s.look.is_delta) {
                 s.lit = block.sample_light(&s.receiver, &paths.points.get(s.number));
             }
             for s in surfaces.iter() {
@@ -102,7 +131,7 @@ impl PathTracer {
             }
         }
         let asked = match self.light_sampling {
-            true => surfaces.iter().filter(|s| !s.material.is_delta()).count(),
+            true => surfaces.iter().filter(|s| !s.look.is_delta).count(),
             false => 0,
         };
         work.avoided.scattered_alone += (surfaces.len() - asked) as u64 * shadow_rays;
@@ -126,7 +155,7 @@ impl PathTracer {
     ) {
         let VertexPoint { id, bsdf, share, .. } = *point;
         let roulette = block.depth >= self.roulette_depth && block.depth < self.max_depth;
-        let lobe = if roulette || s.material.picks_lobe() {
+        let lobe = if roulette || s.look.picks_lobe {
             id.sampler.get_2d(id.index, Dim::at(block.depth, Slot::LobeAndRoulette))
         } else {
             [0.0; 2]
@@ -141,7 +170,7 @@ impl PathTracer {
             work.avoided.absorbed += 1;
             return;
         }
-        let eta2 = s.state.eta2 * s.transmission.map_or(1.0, |t| t.eta2(s.wo, b.wi));
+        let eta2 = s.state.eta2 * s.look.transmission.map_or(1.0, |t| t.eta2(s.wo, b.wi));
         if roulette {
             // Survival by throughput, in terms of the medium that the path began in: what radiance lost on entering
             // glass it gains again on leaving. Never certain, so that no path of a white scene lives for ever.
@@ -154,7 +183,7 @@ impl PathTracer {
         }
         work.next.push(&s.v.spawn(wi, key(&id, block.depth + 1)));
         // Light sampling competes wherever it is tried at all, also where it found nothing this time.
-        let competes = self.light_sampling && !s.material.is_delta() && !b.delta;
+        let competes = self.light_sampling && !s.look.is_delta && !b.delta;
         let state = PathState {
             beta,
             pdf: if competes { b.pdf } else { f32::INFINITY },

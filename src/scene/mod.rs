@@ -9,14 +9,16 @@ pub mod registry;
 
 use crate::base::camera::{Camera, FilmSize};
 use crate::base::geometry::Geometry;
-use crate::base::hit::Hit;
+use crate::base::hit::{Hit, HitBatch};
 use crate::base::intersectable::Intersectable;
+use crate::base::lanes::LANES;
 use crate::base::light::{GuidedLight, Light, LightSampler, PathEnd, Receiver};
 use crate::base::material::Material;
-use crate::base::ray::Ray;
+use crate::base::ray::{Ray, RayBatch};
 use crate::base::shape::Dropped;
 use crate::base::space::RenderSpace;
 use crate::base::vertex::{Origin, Vertex, local_ray};
+use crate::base::vertices::{Met, Vertices};
 use desc::Background;
 use features::Features;
 use std::collections::HashMap;
@@ -91,6 +93,20 @@ pub struct BuildReport {
     pub kernel_seconds: f64,
 }
 
+/// Rays, what they met, and their width per unit of distance.
+#[derive(Clone, Copy)]
+pub struct Meetings<'a> {
+    /// The rays.
+    pub rays: &'a RayBatch,
+    /// As many hits.
+    pub hits: &'a HitBatch,
+    /// Width per unit of distance.
+    pub spread: f32,
+}
+
+/// Fewer hits of a shape than this are worked out one by one: all lanes together cost as much whatever they hold.
+const FEW: usize = 4;
+
 impl Scene {
     /// The surface point of a hit; `spread` is the width of the ray per unit of distance.
     #[inline]
@@ -107,6 +123,35 @@ impl Scene {
             placement,
             Origin { hit, object: found.leaf.object, slot: slot as u32, spread },
         )
+    }
+
+    /// The surface points of the first of the hits `which` (none of them a miss), in lanes of `out`, and how many they
+    /// are: at least 1, if there is any. The same bits as from [`Scene::vertex`].
+    pub fn vertices(&self, met: &Meetings, which: &[u32], out: &mut Vertices) -> usize {
+        let Meetings { rays, hits, spread } = *met;
+        let Some(&first) = which.first() else { return 0 };
+        let path = hits.path[first as usize];
+        let same = which.iter().take(LANES).take_while(|i| hits.path[**i as usize] == path);
+        let n = same.count();
+        if n < FEW {
+            for (lane, &i) in which[..n].iter().enumerate() {
+                let i = i as usize;
+                let hit = Hit { t: hits.t[i], prim: hits.prim[i], path };
+                out.set(lane, &self.vertex(&rays.get(i), hit, spread));
+            }
+            return n;
+        }
+        let found = self.geometry.resolve(path);
+        let met = Met {
+            shape: &*found.leaf.shape,
+            placement: found.placement.as_ref(),
+            object: found.leaf.object,
+            many_slots: self.objects[found.leaf.object as usize].materials.len() > 1,
+            spread,
+            needs: self.features.needs,
+        };
+        out.find(rays, hits, &which[..n], &met);
+        n
     }
 
     /// The material at a vertex.

@@ -1,5 +1,6 @@
 //! Every row of the registry, by its own sample parameters, through the promises of [`Shape`].
 
+mod batch;
 mod sampling;
 
 use super::REGISTRY;

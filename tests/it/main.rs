@@ -23,3 +23,4 @@ mod product;
 mod reference;
 mod seeds;
 mod source;
+mod vertices;

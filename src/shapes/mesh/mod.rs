@@ -1,8 +1,10 @@
 //! Triangle meshes: from a file's data, in double precision, to single precision in the space of a group.
 
+mod batch;
 mod place;
 mod refine;
 mod sample;
+mod shading;
 mod shape;
 mod smooth;
 

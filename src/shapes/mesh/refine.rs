@@ -3,7 +3,7 @@
 use crate::base::shape::LocalRay;
 use crate::math::bounds::{U32, UNDERFLOW, gamma};
 use crate::math::triangle::TriangleRay;
-use glam::{DVec3, Vec3, Vec3A, Vec3Swizzles};
+use glam::{DVec3, Vec3, Vec3Swizzles};
 
 /// A point of a triangle.
 #[derive(Debug, Clone, Copy)]
@@ -38,13 +38,9 @@ pub struct Triangle {
 impl Triangle {
     /// From single precision, without error but for differences of very unequal numbers.
     #[inline(always)]
-    pub fn new(corners: [Vec3; 3]) -> Self {
-        Triangle::between(corners.map(|v| v.as_dvec3()))
-    }
-
-    #[inline(always)]
-    fn between([v0, b, c]: [DVec3; 3]) -> Self {
-        let (e1, e2) = (b - v0, c - v0);
+    pub fn new([v0, b, c]: [Vec3; 3]) -> Self {
+        let v0 = v0.as_dvec3();
+        let (e1, e2) = (b.as_dvec3() - v0, c.as_dvec3() - v0);
         Triangle { v0, e1, e2, n: e1.cross(e2) }
     }
 
@@ -63,17 +59,22 @@ impl Triangle {
     /// passes by, the point nearest to the ray.
     #[inline(always)]
     pub fn locate(&self, ray: &LocalRay) -> TrianglePoint {
+        let (point, inside) = self.cross(ray.o, ray.d);
+        if inside { point } else { nearest_on_edges(*ray, *self) }
+    }
+
+    /// The point of the triangle's plane that a ray crosses, and whether it lies within the triangle; false for all that
+    /// is odd, NaN among it. Without a branch, for loops over many.
+    #[inline(always)]
+    pub fn cross(&self, o: DVec3, d: DVec3) -> (TrianglePoint, bool) {
         // Cramer's rule as by Moeller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", JGT 2(1), 1997.
-        let s = ray.o - self.v0;
-        let q = s.cross(ray.d);
-        let inv = -1.0 / ray.d.dot(self.n);
+        let s = o - self.v0;
+        let q = s.cross(d);
+        let inv = -1.0 / d.dot(self.n);
         let (b1, b2, t) = (self.e2.dot(q) * inv, -self.e1.dot(q) * inv, s.dot(self.n) * inv);
         let b0 = 1.0 - b1 - b2;
-        // One branch for all that is odd, NaN among it.
-        if (b0 >= 0.0) & (b1 >= 0.0) & (b2 >= 0.0) & (inv.abs() < f64::INFINITY) {
-            return TrianglePoint { b1, b2, t };
-        }
-        nearest_on_edges(*ray, *self)
+        let inside = (b0 >= 0.0) & (b1 >= 0.0) & (b2 >= 0.0) & (inv.abs() < f64::INFINITY);
+        (TrianglePoint { b1, b2, t }, inside)
     }
 }
 
@@ -121,14 +122,19 @@ fn nearest_on_edges(ray: LocalRay, triangle: Triangle) -> TrianglePoint {
 /// Worked out in f32, but for what could underflow: the bound is generous, and where the rounding of `p` matters
 /// beside the triangle's size, the rounding of a vertex' position is added anyway.
 #[inline(always)]
-pub fn test_error(v: [Vec3A; 3], p: Vec3A, n: DVec3) -> DVec3 {
+pub fn test_error(v: [Vec3; 3], p: Vec3, n: DVec3) -> DVec3 {
     let r0 = (v[0] - p).abs();
     let r = r0.max((v[1] - p).abs()).max((v[2] - p).abs());
     let (e1, e2) = (v[1] - v[0], v[2] - v[0]);
-    let terms = |a: Vec3A, b: Vec3A| (a.yzx() * b.zxy()).abs() + (a.zxy() * b.yzx()).abs();
     let m = terms(e1, e2).min(terms(e1, v[2] - v[1]));
     let height = (f64::from(gamma(21)) * r0.as_dvec3().dot(m.as_dvec3()) + 9.0 * UNDERFLOW) / n.length();
     // A plane through a corner cannot be further away than the corner.
     let height = (height as f32).min(r.max_element());
-    (r * (2.0 * U32) + Vec3A::splat(height)).as_dvec3()
+    (r * (2.0 * U32) + Vec3::splat(height)).as_dvec3()
+}
+
+/// The sizes of the terms of a x b, added up.
+#[inline(always)]
+fn terms(a: Vec3, b: Vec3) -> Vec3 {
+    (a.yzx() * b.zxy()).abs() + (a.zxy() * b.yzx()).abs()
 }

@@ -1,14 +1,18 @@
 //! A placed triangle mesh.
 
 use super::MissingUv;
+use super::batch::refine_batch;
 use super::place::transformed;
 use super::refine::{Triangle, TrianglePoint, intersect, test_error};
 use super::sample;
+use super::shading::shading;
+use crate::base::hit::Hit;
+use crate::base::lanes::{LocalRays, Surfaces};
 use crate::base::mesh::TriangleMesh;
 use crate::base::shape::{LocalRay, Needs, Shape, ShapeSample, Surface};
 use crate::error::Result;
 use crate::math::aabb::Aabb;
-use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3, Vec3A};
+use glam::{DAffine3, DVec2, DVec3, Vec2, Vec3};
 use std::sync::Arc;
 
 /// Valid triangles in the space of their group.
@@ -53,38 +57,12 @@ impl MeshShape {
         let [p, q, r] = self.corner_uvs(prim);
         (p + (q - p) * b1 + (r - p) * b2).as_vec2()
     }
-}
 
-/// A shading normal on the side of the geometric one, and the lift to the surface it pretends.
-struct Shading {
-    ns: DVec3,
-    lift: DVec3,
-}
-
-/// Interpolates the corners' normals `c`. The lift projects `p` onto the tangent planes of the corners and mixes the
-/// results by the same weights (Hanika, "Hacking the shadow terminator", Ray Tracing Gems II, ch. 4).
-///
-/// In f32: a lift that is off by the rounding of `p` still points outward, and normals have no more digits.
-#[inline(always)]
-fn shading(c: [Vec3A; 3], b: [f64; 2], v: [Vec3A; 3], p: Vec3A, ng: DVec3) -> Shading {
-    let (b0, b1, b2) = ((1.0 - b[0] - b[1]) as f32, b[0] as f32, b[1] as f32);
-    let ns = c[0] * b0 + c[1] * b1 + c[2] * b2;
-    // Normals that cancel each other say nothing.
-    if ns.length_squared() <= 1e-12 {
-        return Shading { ns: ng, lift: DVec3::ZERO };
+    /// Texture coordinates, and the derivatives of the point along them.
+    fn texture(&self, prim: u32, [b1, b2]: [f64; 2]) -> (Vec2, [DVec3; 2]) {
+        let triangle = Triangle::new(self.mesh.corners(prim));
+        (self.uv(prim, b1, b2), tangents(self.corner_uvs(prim), triangle.e1, triangle.e2))
     }
-    let ns = ns.as_dvec3();
-    let side = 1f64.copysign(ns.dot(ng));
-    let side32 = side as f32;
-    // The part of p - v below the plane through v with normal c, upwards.
-    let above = |c: Vec3A, v: Vec3A, b: f32| {
-        let h = c.dot(p - v) * side32;
-        c * if h < 0.0 { -h * b * side32 } else { 0.0 }
-    };
-    let lift = above(c[0], v[0], b0) + above(c[1], v[1], b1) + above(c[2], v[2], b2);
-    // A corner whose normal looks away from the face could push the point through it.
-    let lift = if lift.dot(ng.as_vec3a()) >= 0.0 { lift.as_dvec3() } else { DVec3::ZERO };
-    Shading { ns: ns * side, lift }
 }
 
 /// Derivatives of the point along u and v; zero where the uvs have no area.
@@ -123,8 +101,7 @@ impl Shape for MeshShape {
         let triangle = Triangle::new(corners);
         let TrianglePoint { b1, b2, t } = triangle.locate(ray);
         let (p, ng) = (triangle.at(b1, b2), triangle.n);
-        let corners = [Vec3A::from(corners[0]), Vec3A::from(corners[1]), Vec3A::from(corners[2])];
-        let p32 = p.as_vec3a();
+        let p32 = p.as_vec3();
         let mut surface = Surface {
             t,
             p,
@@ -137,17 +114,27 @@ impl Shape for MeshShape {
             lift: DVec3::ZERO,
         };
         if !self.mesh.normals.is_empty() {
-            let [i, j, k] = self.mesh.indices[prim as usize];
-            let normal = |i: u32| Vec3A::from_array(self.mesh.normals[i as usize]);
-            let s = shading([normal(i), normal(j), normal(k)], [b1, b2], corners, p32, ng);
+            let s = shading(self.mesh.corner_normals(prim), [b1, b2], corners, p32, ng);
             (surface.ns, surface.lift) = (s.ns, s.lift);
         }
         if needs.uv || needs.tangents {
-            surface.uv = self.uv(prim, b1, b2);
-            let uv = self.corner_uvs(prim);
-            [surface.dpdu, surface.dpdv] = tangents(uv, triangle.e1, triangle.e2);
+            (surface.uv, [surface.dpdu, surface.dpdv]) = self.texture(prim, [b1, b2]);
         }
         surface
+    }
+
+    fn refine_batch(&self, rays: &LocalRays, hits: &[Hit], needs: Needs, out: &mut Surfaces) {
+        let weights = refine_batch(&self.mesh, rays, hits, out);
+        if needs.uv || needs.tangents {
+            for (lane, hit) in hits.iter().enumerate() {
+                let b = [weights.b1[lane], weights.b2[lane]];
+                let (uv, [dpdu, dpdv]) = self.texture(hit.prim, b);
+                (out.uv[lane], out.dpdu[lane], out.dpdv[lane]) = (uv, dpdu, dpdv);
+            }
+        }
+        for (lane, hit) in hits.iter().enumerate().filter(|(lane, _)| weights.is_odd(*lane)) {
+            out.set(lane, &self.refine(&rays.get(lane), hit.prim, hit.t, needs));
+        }
     }
 
     fn material_slot(&self, prim: u32) -> usize {
