@@ -160,6 +160,28 @@ pub trait Light: Send + Sync {
         false
     }
 
+    /// Whether [`Light::sample_li`] ever gives a sample. If not, nothing need be drawn for it, and no path that ends on it
+    /// competes with light samples.
+    fn is_sampled(&self) -> bool {
+        true
+    }
+
+    /// Whether nothing comes from it, ever: a scene does without it.
+    fn is_black(&self) -> bool {
+        false
+    }
+
+    /// The radiance that paths which leave the scene meet, if it is the same in all directions.
+    fn le_everywhere(&self) -> Option<Rgb> {
+        None
+    }
+
+    /// Whether what paths which leave the scene meet varies without detail in the directions within `half_angle` of `axis`:
+    /// points that lie a degree apart and fit to each other tell what lies between them.
+    fn is_smooth(&self, _axis: Vec3, _half_angle: f32) -> bool {
+        false
+    }
+
     /// This light as one that takes the surface into account; None if it does not.
     fn guided(&self) -> Option<&dyn GuidedLight> {
         None

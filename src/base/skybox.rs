@@ -98,6 +98,12 @@ pub trait Skybox: Send + Sync {
         None
     }
 
+    /// Whether radiance has no detail but a straight horizon: where points that lie a degree apart fit to each other, there
+    /// is nothing else between them.
+    fn is_smooth(&self) -> bool {
+        false
+    }
+
     /// The natural grid: no finer than what [`Skybox::radiance`] resolves.
     fn grid(&self) -> ChartGrid;
 

@@ -199,6 +199,10 @@ fn skips(scene: &Scene, spp: Option<u32>) -> Vec<String> {
     let all = [
         (!f.emitting_surfaces, "the surfaces that last rays meet, as none shines"),
         (lights.list.is_empty(), "shadow rays, as there is no light"),
+        (
+            !f.sampled_lights && !lights.list.is_empty(),
+            "shadow rays, as scattered rays find all light as well",
+        ),
         (!f.many_lights && !lights.list.is_empty(), "the choice of a light"),
         (!f.needs.uv, "texture coordinates and textures"),
         (!f.needs.tangents, "tangents"),

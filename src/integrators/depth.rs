@@ -21,6 +21,8 @@ pub(super) struct Block<'a> {
     pub depth: u32,
     /// See [`super::path::PathTracer::mis`].
     pub mis: bool,
+    /// Whether light samples are taken: some light can be sampled.
+    pub samples_lights: bool,
     /// Whether each light is sampled.
     pub each_light: bool,
     /// The light at infinity that takes surfaces into account.

@@ -209,12 +209,14 @@ impl PathTracer {
 
     fn block<'a>(&'a self, scene: &'a Scene, batch: &'a CameraBatch, depth: u32) -> Block<'a> {
         let lights = &scene.lights;
-        let guided = if self.light_sampling { lights.guided() } else { None };
+        let samples_lights = self.light_sampling && scene.features.sampled_lights;
+        let guided = if samples_lights { lights.guided() } else { None };
         Block {
             scene,
             ids: &batch.ids,
             depth,
             mis: self.mis,
+            samples_lights,
             each_light: self.each_light && lights.list.len() <= MOST_EACH,
             guided,
             strategies: &self.strategies,
@@ -247,7 +249,7 @@ impl PathTracer {
         }
         paths.sort_out(&work.hits, rays);
         paths.escapes.add_background(scene, &mut out.li);
-        paths.draw(&block, self.light_sampling, |_, i| i);
+        paths.draw(&block, |_, i| i);
         let mut some = Together::default();
         loop {
             let met = Meetings { rays, hits: &work.hits, spread: batch.spread };
@@ -292,7 +294,7 @@ impl PathTracer {
         block.add_escapes(paths, out);
         let goes_on = block.depth <= self.max_depth;
         if goes_on {
-            paths.draw(block, self.light_sampling, |states, i| states[i as usize].index);
+            paths.draw(block, |states, i| states[i as usize].index);
         }
         let mut some = Together::default();
         loop {
@@ -364,9 +366,9 @@ impl PathScratch {
     }
 
     /// Draws the points of all hits; `path_of` tells the path of a ray.
-    fn draw(&mut self, block: &Block, with_light: bool, path_of: impl Fn(&[PathState], u32) -> u32) {
+    fn draw(&mut self, block: &Block, path_of: impl Fn(&[PathState], u32) -> u32) {
         let paths = self.hits.iter().map(|&i| path_of(&self.states, i));
-        self.points.draw(block.ids, paths, block.depth, with_light);
+        self.points.draw(block.ids, paths, block.depth, block.samples_lights);
     }
 
     fn begin(&mut self, next: &mut RayBatch, shadow: &mut RayBatch) {

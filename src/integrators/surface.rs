@@ -116,11 +116,11 @@ impl PathTracer {
             return;
         }
         let before = work.shadow.len();
-        if self.light_sampling && block.each_light {
+        if block.samples_lights && block.each_light {
             for s in surfaces.iter().filter(|s| !s.look.is_delta) {
                 block.ask_each(s, work, paths);
             }
-        } else if self.light_sampling {
+        } else if block.samples_lights {
             for s in surfaces.iter_mut().filter(|s| !s.look.is_delta) {
                 s.lit = block.sample_light(&s.receiver, &paths.points.get(s.number));
             }
@@ -130,7 +130,7 @@ impl PathTracer {
                 }
             }
         }
-        let asked = match self.light_sampling {
+        let asked = match block.samples_lights {
             true => surfaces.iter().filter(|s| !s.look.is_delta).count(),
             false => 0,
         };
@@ -183,7 +183,7 @@ impl PathTracer {
         }
         work.next.push(&s.v.spawn(wi, key(&id, block.depth + 1)));
         // Light sampling competes wherever it is tried at all, also where it found nothing this time.
-        let competes = self.light_sampling && !s.look.is_delta && !b.delta;
+        let competes = block.samples_lights && !s.look.is_delta && !b.delta;
         let state = PathState {
             beta,
             pdf: if competes { b.pdf } else { f32::INFINITY },

@@ -62,6 +62,9 @@ impl AreaLight {
             shining.map(|p| primitive_bounds(&*shape, p, emitter(p))).reduce(|a, b| union(&a, &b))?;
         // Sums of millions in f32 would lose the last ones.
         let total: f64 = (0..count).map(|p| power(&*shape, p, emitter(p))).sum();
+        if total == 0.0 {
+            return None;
+        }
         let bounds = EmitterBounds { power: total as f32, ..bounds };
         Some(AreaLight { shape, materials, primitives, bounds })
     }

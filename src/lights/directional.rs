@@ -75,6 +75,10 @@ impl Light for Directional {
         true
     }
 
+    fn is_black(&self) -> bool {
+        self.irradiance.is_black()
+    }
+
     fn pdf_li(&self, _at: &Receiver, _end: &PathEnd) -> f32 {
         0.0
     }

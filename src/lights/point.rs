@@ -114,6 +114,10 @@ impl Light for PointLight {
         true
     }
 
+    fn is_black(&self) -> bool {
+        self.intensity.is_black()
+    }
+
     fn pdf_li(&self, _at: &Receiver, _end: &PathEnd) -> f32 {
         0.0
     }

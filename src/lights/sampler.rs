@@ -27,7 +27,8 @@ pub fn by_name(name: &str, lights: &[Arc<dyn Light>], extent: &Extent) -> Result
 /// surface) then costs no more than this factor.
 const LEAST_SHARE: f64 = 0.1;
 
-/// Chooses with the same probabilities everywhere. Every light has a probability of more than 0.
+/// Chooses with the same probabilities everywhere. Every light has a probability of more than 0, but for those
+/// that are never sampled, where it is by power.
 pub struct FixedLightSampler {
     /// None if there is no light.
     choices: Option<Distribution1D>,
@@ -47,14 +48,17 @@ impl FixedLightSampler {
     }
 }
 
-/// By power, mixed with a tenth of an even share; even where no light has any. Together 1.
+/// By power, mixed with a tenth of an even share; even where no light has any. Together 1. Lights that are never sampled have
+/// none.
 fn shares(lights: &[Arc<dyn Light>], extent: &Extent) -> Vec<f64> {
     let usable = |p: f64| if p > 0.0 && p.is_finite() { p } else { 0.0 };
-    let powers: Vec<f64> = lights.iter().map(|l| usable(f64::from(l.power(extent)))).collect();
-    let total: f64 = powers.iter().sum();
-    let even = 1.0 / lights.len() as f64;
+    let sampled = |l: &dyn Light| l.is_sampled().then(|| usable(f64::from(l.power(extent))));
+    let powers: Vec<Option<f64>> = lights.iter().map(|l| sampled(&**l)).collect();
+    let total: f64 = powers.iter().flatten().sum();
+    let even = 1.0 / powers.iter().flatten().count() as f64;
     let share = |p: f64| (1.0 - LEAST_SHARE) * p / total + LEAST_SHARE * even;
-    powers.into_iter().map(|p| if total > 0.0 { share(p) } else { even }).collect()
+    let of_light = |p: Option<f64>| p.map_or(0.0, |p| if total > 0.0 { share(p) } else { even });
+    powers.into_iter().map(of_light).collect()
 }
 
 impl LightSampler for FixedLightSampler {

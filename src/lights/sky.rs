@@ -317,9 +317,28 @@ impl Light for SkyLight {
                 self.sky.radiance_batch(turned.view(), out);
             }
         }
-        for (i, out) in out.iter_mut().enumerate() {
-            *out = self.with_discs(*out, wi.get(i));
+        if self.intensity != 1.0 {
+            out.iter_mut().for_each(|l| *l = *l * self.intensity);
         }
+        self.discs.iter().for_each(|disc| disc.add_to(wi, out));
+    }
+
+    fn is_sampled(&self) -> bool {
+        // Discs have a share only where the sampler gives them one.
+        !matches!(self.map, MapSampler::None) || self.discs.iter().any(|d| d.share > 0.0)
+    }
+
+    fn is_black(&self) -> bool {
+        self.le_everywhere().is_some_and(Rgb::is_black)
+    }
+
+    fn le_everywhere(&self) -> Option<Rgb> {
+        let plain = self.sky.constant().filter(|_| self.discs.is_empty());
+        plain.map(|radiance| radiance * self.intensity)
+    }
+
+    fn is_smooth(&self, axis: Vec3, half_angle: f32) -> bool {
+        self.sky.is_smooth() && self.discs.iter().all(|d| !d.meets(axis, half_angle))
     }
 
     fn guided(&self) -> Option<&dyn GuidedLight> {

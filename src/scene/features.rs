@@ -12,6 +12,8 @@ pub struct Features {
     pub emitting_surfaces: bool,
     /// Whether there is more than one light, so that one must be chosen.
     pub many_lights: bool,
+    /// Whether any light can be sampled: a sky that is the same everywhere is best left to scattered rays.
+    pub sampled_lights: bool,
     /// Whether any object has more than one material.
     pub material_slots: bool,
 }

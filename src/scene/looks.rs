@@ -105,6 +105,7 @@ impl Looks {
             needs: objects.iter().flat_map(|o| &o.materials).fold(Default::default(), |n, m| m.needs().or(n)),
             emitting_surfaces: !lights.by_path.is_empty(),
             many_lights: lights.list.len() > 1,
+            sampled_lights: lights.list.iter().any(|l| l.is_sampled()),
             material_slots: objects.iter().any(|o| o.materials.len() > 1),
         };
         Ok(Looks { objects, lights, features })
@@ -208,6 +209,7 @@ fn gather_lights(placed: &Placed, desc: &SceneDesc, registry: &Registry) -> Resu
         let source = build_node("light", &registry.lights, node)?;
         list.push(source.place(placed.space)?);
     }
+    list.retain(|light| !light.is_black());
     let mut by_path = HashMap::new();
     let emits = |o: &Object| o.materials.iter().any(|m| m.emitter().is_some());
     let emitting_objects: Vec<bool> = placed.objects.iter().map(emits).collect();

@@ -19,8 +19,10 @@ use crate::base::shape::Dropped;
 use crate::base::space::RenderSpace;
 use crate::base::vertex::{Origin, Vertex, local_ray};
 use crate::base::vertices::{Met, Vertices};
+use crate::color::Rgb;
 use desc::Background;
 use features::Features;
+use glam::Vec3;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -174,6 +176,18 @@ impl Lights {
         // Most vertices lie on nothing that emits, and need not be looked for.
         let emits = self.emitting_objects.get(v.object as usize).is_some_and(|emits| *emits);
         if emits { self.by_path.get(&v.path).copied() } else { None }
+    }
+
+    /// What paths which leave the scene end on, if it is the same in all directions.
+    pub fn le_everywhere(&self) -> Option<Rgb> {
+        let mut each = self.at_infinity.iter().map(|&i| self.list[i as usize].le_everywhere());
+        each.try_fold(Rgb::BLACK, |sum, le| Some(sum + le?))
+    }
+
+    /// Whether that varies without detail in these directions; see [`Light::is_smooth`].
+    pub fn is_smooth(&self, axis: Vec3, half_angle: f32) -> bool {
+        let constant_or_smooth = |l: &dyn Light| l.le_everywhere().is_some() || l.is_smooth(axis, half_angle);
+        self.at_infinity.iter().all(|&i| constant_or_smooth(&*self.list[i as usize]))
     }
 
     /// Density per solid angle with which light sampling from `from` finds `end` on `light`, choice of light included.

@@ -260,6 +260,10 @@ impl Skybox for Daylight {
         self.dome.radiance(d)
     }
 
+    fn is_smooth(&self) -> bool {
+        true
+    }
+
     fn grid(&self) -> ChartGrid {
         ChartGrid { count: 1, width: 128, height: 64 }
     }

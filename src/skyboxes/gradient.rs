@@ -27,6 +27,10 @@ impl Skybox for Gradient {
         (self.zenith == self.horizon && self.ground == self.horizon).then_some(self.horizon)
     }
 
+    fn is_smooth(&self) -> bool {
+        true
+    }
+
     fn grid(&self) -> ChartGrid {
         // Nothing depends on u.
         ChartGrid { count: 1, width: 1, height: 64 }

@@ -23,4 +23,5 @@ mod product;
 mod reference;
 mod seeds;
 mod source;
+mod unneeded;
 mod vertices;

@@ -1,9 +1,10 @@
 //! What of a sky stands in world space: its turn about the upright axis, and its discs.
 
+use crate::base::directions::Directions;
 use crate::base::light::Receiver;
 use crate::base::skybox::SkyDisc;
 use crate::color::Rgb;
-use crate::math::Frame;
+use crate::math::{Frame, simd};
 use crate::sampling::warp;
 use glam::{DVec3, Vec2, Vec3};
 
@@ -70,6 +71,27 @@ impl PlacedDisc {
         (w - self.frame.n).length_squared() <= 2.0 * self.m
     }
 
+    /// Adds it to the radiance of directions, one each.
+    pub fn add_to(&self, w: Directions, out: &mut [Rgb]) {
+        // Hardly ever does one of many directions meet it.
+        if !simd::dispatch(AnyWithin { disc: self, w }) {
+            return;
+        }
+        for (i, out) in out.iter_mut().enumerate() {
+            if self.contains(w.get(i)) {
+                *out += self.radiance;
+            }
+        }
+    }
+
+    /// Whether it reaches within `half_angle` of `axis`.
+    pub fn meets(&self, axis: Vec3, half_angle: f32) -> bool {
+        // Angles by half of the chord, which has digits where a cosine has none. Some roundings more rather than less.
+        let angle = 2.0 * (0.5 * (axis - self.frame.n).length()).min(1.0).asin();
+        let own = 2.0 * (0.5 * self.m).sqrt().min(1.0).asin();
+        angle <= 1.001 * (half_angle + own)
+    }
+
     /// Whether any of it is above the horizon of a receiver.
     #[inline(always)]
     pub fn in_sight(&self, at: &Receiver) -> bool {
@@ -83,5 +105,25 @@ impl PlacedDisc {
         }
         // Rounding carried it over the rim.
         w.lerp(self.frame.n, 1e-3).normalize()
+    }
+}
+
+/// Whether a disc contains any of some directions: without branches, so that many are tested at once.
+struct AnyWithin<'a> {
+    disc: &'a PlacedDisc,
+    w: Directions<'a>,
+}
+
+impl simd::Kernel for AnyWithin<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run(self) -> bool {
+        let Directions { x, y, z } = self.w;
+        let mut any = false;
+        for ((&x, &y), &z) in x.iter().zip(y).zip(z) {
+            any |= self.disc.contains(Vec3::new(x, y, z));
+        }
+        any
     }
 }

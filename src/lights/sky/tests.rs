@@ -220,6 +220,8 @@ fn a_constant_sky_is_left_to_bsdf_sampling_and_is_a_furnace() {
     for value in [0.0, 0.7] {
         let sky = sky("constant", Params::new().with("radiance", Value::Number(value)));
         let light = SkyLight::new(sky, &SkyOptions::default()).unwrap();
+        assert!(!light.is_sampled() && light.is_black() == (value == 0.0));
+        assert_eq!(light.le_everywhere(), Some(Rgb::splat(value as f32)));
         let mut rng = TestRng::new(5);
         for _ in 0..100 {
             let n = rng.direction();
@@ -349,5 +351,30 @@ fn methods_have_names_and_options_their_ranges() {
     for (intensity, rotate_y_deg) in [(-1.0, 0.0), (f64::NAN, 0.0), (1e300, 0.0), (1.0, f64::INFINITY)] {
         let options = SkyOptions { intensity, rotate_y_deg, ..SkyOptions::default() };
         assert!(SkyLight::new(sky.clone(), &options).is_err());
+    }
+}
+
+/// What is told of a whole batch or cone is what single directions tell.
+#[test]
+fn discs_are_where_batches_and_cones_say() {
+    let sky = sky("daylight", Params::new());
+    let light = light(&sky, SkySampling::Product, 70.0);
+    let [disc] = &light.discs[..] else { panic!("one sun") };
+    let own = disc.sin.asin();
+    let tilted = |angle: f32| disc.frame.to_world(Vec3::new(angle.sin(), 0.0, angle.cos()));
+    for (angle, cone) in [(0.0, 0.01), (0.3, 0.31), (0.3, 0.28), (1.5, 1.4), (3.1, 3.2)] {
+        let axis = tilted(angle);
+        assert_eq!(disc.meets(axis, cone), angle < cone + own, "{angle} {cone}");
+        assert_eq!(light.is_smooth(axis, cone), angle > cone + own, "{angle} {cone}");
+    }
+    for near in [0.0, 0.5, 0.99, 1.01, 4.0] {
+        let w: Vec<Vec3> = (0..37).map(|i| tilted(if i == 20 { near * own } else { 0.4 })).collect();
+        let batch: DirectionBatch = w.iter().copied().collect();
+        let mut got = vec![Rgb::BLACK; w.len()];
+        light.le_escaped(batch.view(), &mut got);
+        for (w, got) in w.iter().zip(got) {
+            assert_eq!(got, light.le(&away(*w)));
+        }
+        assert_eq!(light.radiance(w[20]).luminance() > 1e3 * light.radiance(w[0]).luminance(), near < 1.0);
     }
 }
