@@ -1,21 +1,27 @@
 //! Pixels that see nothing but what is behind everything: their filter's integral of it, instead of samples.
 //!
-//! The sky is looked up on a grid of 4 x 4 points a pixel, which neighbours share, and the filter laid over it one axis
+//! A sky that is the same everywhere is what it is, and one without detail takes a few points a tile ([`smooth`]). Any other
+//! sky, and tiles that a sun or a horizon runs through, are looked up on a grid of 4 x 4 points a pixel, which neighbours share, and the filter laid over it one axis
 //! after the other: up to 144 points count for a pixel, of which it pays for 16 to 23. Half of the points make an estimate
 //! by themselves and the other half another, in three ways: by rows, by columns and by fields, of which those at the ends
 //! of every four are one half and those between the other, so that a mere slope divides evenly. Where halves differ by too
 //! much (the rim of a sun, stars, texels as large as pixels that differ wildly) the pixel is sampled as others are. One way
 //! is not enough: halves agree by chance, too.
 
+mod smooth;
+
 use super::coverage::Coverage;
 use super::film::TILE_SIDE;
 use crate::base::camera::FilmSamples;
+use crate::base::directions::Directions;
 use crate::base::pixel_rect::PixelRect;
 use crate::base::ray::RayBatch;
 use crate::color::Rgb;
+use crate::math::simd;
 use crate::sampling::filter::PixelFilter;
 use crate::scene::Scene;
 use crate::scene::desc::Background;
+use glam::{Vec3, Vec4};
 
 /// Points along each side of a pixel.
 const PER_PIXEL: usize = 4;
@@ -25,24 +31,24 @@ const TOLERANCE: f32 = 1e-3;
 
 /// Tiles that are tried.
 const TRIED: usize = 16;
-/// Samples whose rays cost as much as the lookups of a pixel.
-const WORTH: u64 = 12;
+/// Samples whose rays cost as much as the lookups of a pixel, and as its share of a few points a tile.
+const WORTH: [u64; 2] = [12, 1];
 
 /// Whether integrals pay: whether of the pixels that see nothing enough can be taken. Some tiles tell, the same whatever the
 /// threads. Under a photograph of fine grain hardly a pixel is taken.
 pub fn pays(scene: &Scene, filter: PixelFilter, coverage: &Coverage, rect: PixelRect, spp: u32) -> bool {
     let is_free = |(x, y): (u32, u32)| !coverage.is_covered(x, y);
     let tiles: Vec<PixelRect> = rect.tiles(TILE_SIDE).filter(|tile| tile.pixels().any(&is_free)).collect();
-    let (mut free, mut taken) = (0, 0);
+    let (mut spent, mut taken) = (0, 0);
     let mut backdrop = Backdrop::default();
     for tile in tiles.iter().step_by(tiles.len().div_ceil(TRIED).max(1)) {
         backdrop.fill(scene, filter, *tile);
         for (x, y) in tile.pixels().filter(|p| is_free(*p)) {
-            free += 1;
+            spent += WORTH[usize::from(backdrop.is_cheap)];
             taken += u64::from(backdrop.get(x, y).is_some());
         }
     }
-    taken * u64::from(spp) >= free * WORTH
+    taken * u64::from(spp) >= spent
 }
 
 /// Works out pixels; keeps its room from tile to tile.
@@ -53,11 +59,20 @@ pub struct Backdrop {
     rays: RayBatch,
     li: Vec<Rgb>,
     more: Vec<Rgb>,
-    /// After the first axis, see [`fold`].
-    rows: Vec<[Rgb; 2]>,
+    /// See [`FoldDown`].
+    columns: [Vec<f32>; 2],
+    /// Those of tiles without detail, from the coarsest on.
+    lattices: [smooth::Axis; 3],
+    tile: Vec<Rgb>,
+    room: smooth::Room,
     /// By pixel of the tile.
     pixels: Vec<Option<Rgb>>,
     rect: PixelRect,
+    /// See [`taps`], and whose they are.
+    taps: Option<Vec<[f32; 2]>>,
+    filter: Option<PixelFilter>,
+    /// Whether they took a few points together, or none.
+    is_cheap: bool,
 }
 
 /// What each point along one axis about a pixel counts for, first to last: the filter's weight, together 1, and half of
@@ -80,19 +95,69 @@ impl Backdrop {
     pub fn fill(&mut self, scene: &Scene, filter: PixelFilter, rect: PixelRect) {
         self.rect = rect;
         self.pixels.clear();
-        match scene.background {
-            Background::Transparent => self.pixels.resize(rect.area(), Some(Rgb::BLACK)),
-            Background::Color(c) => self.pixels.resize(rect.area(), Some(Rgb::from(c))),
-            Background::Sky => match taps(filter) {
-                Some(taps) => self.fill_sky(scene, &taps, rect),
-                None => self.pixels.resize(rect.area(), None),
-            },
+        let same = match scene.background {
+            Background::Transparent => Some(Rgb::BLACK),
+            Background::Color(c) => Some(Rgb::from(c)),
+            Background::Sky => scene.lights.le_everywhere(),
+        };
+        self.is_cheap = true;
+        self.pixels.resize(rect.area(), same);
+        if same.is_some() {
+            return;
         }
+        if self.filter != Some(filter) {
+            (self.filter, self.taps) = (Some(filter), taps(filter));
+            self.lattices = Default::default();
+        }
+        let Some(taps) = self.taps.take() else { return };
+        // Tiles of the whole picture, whatever part of it is rendered: no pixel depends on that.
+        let start = |from: u32| from / TILE_SIDE * TILE_SIDE;
+        for y in (start(rect.y0)..rect.y1).step_by(TILE_SIDE as usize) {
+            for x in (start(rect.x0)..rect.x1).step_by(TILE_SIDE as usize) {
+                let tile = PixelRect::new(x, y, x + TILE_SIDE, y + TILE_SIDE);
+                let part = tile.intersection(&rect);
+                if self.fill_smooth(scene, &taps, tile) {
+                    part.pixels()
+                        .for_each(|(x, y)| self.pixels[rect.index(x, y)] = Some(self.tile[tile.index(x, y)]));
+                } else {
+                    self.is_cheap = false;
+                    self.fill_sky(scene, &taps, part);
+                }
+            }
+        }
+        self.taps = Some(taps);
     }
 
     /// What a pixel of the rectangle shows; None where it must be sampled.
     pub fn get(&self, x: u32, y: u32) -> Option<Rgb> {
         self.pixels[self.rect.index(x, y)]
+    }
+
+    /// Works out a tile by a few points, if it can be; see [`smooth`].
+    fn fill_smooth(&mut self, scene: &Scene, taps: &[[f32; 2]], tile: PixelRect) -> bool {
+        for (level, step) in smooth::steps(scene.camera.pixel_spread()).enumerate() {
+            let axis = &mut self.lattices[level];
+            axis.prepare(taps, step);
+            self.x.clear();
+            self.y.clear();
+            let n = axis.points.len();
+            for y in &axis.points {
+                self.x.extend(axis.points.iter().map(|x| tile.x0 as f32 + x));
+                self.y.extend(std::iter::repeat_n(tile.y0 as f32 + y, n));
+            }
+            self.aim(scene);
+            // All lattices of a tile have the same corners.
+            if level == 0 && !is_smooth(scene, self.rays.directions(), n) {
+                return false;
+            }
+            self.look_up(scene);
+            let axis = &self.lattices[level];
+            if axis.fits(&self.li, &mut self.room) {
+                axis.pixels(&self.li, &mut self.room, &mut self.tile);
+                return true;
+            }
+        }
+        false
     }
 
     fn fill_sky(&mut self, scene: &Scene, taps: &[[f32; 2]], rect: PixelRect) {
@@ -107,34 +172,32 @@ impl Backdrop {
             self.x.extend((0..w).map(|i| place(rect.x0, i)));
             self.y.extend(std::iter::repeat_n(place(rect.y0, j), w));
         }
+        self.aim(scene);
         self.look_up(scene);
-        self.rows.clear();
-        for row in self.li.chunks_exact(w) {
-            for pixel in 0..rect.width() as usize {
-                self.rows.push(fold(taps, row[pixel * PER_PIXEL..].iter().copied()));
+        // Reading a pixel's last channel takes one number more.
+        self.columns.iter_mut().for_each(|c| c.resize(3 * w + 1, 0.0));
+        let li: &[f32] = bytemuck::cast_slice(&self.li);
+        let rows = li.windows(taps.len() * 3 * w).step_by(PER_PIXEL * 3 * w);
+        for (y, row) in (rect.y0..).zip(rows) {
+            let [sums, halves] = self.columns.each_mut().map(Vec::as_mut_slice);
+            simd::dispatch(FoldDown { taps, row, sums: &mut sums[..3 * w], halves: &mut halves[..3 * w] });
+            for x in 0..rect.width() {
+                self.pixels[self.rect.index(rect.x0 + x, y)] = fold(taps, [sums, halves], x as usize);
             }
         }
-        let across = rect.width() as usize;
-        for pixel in 0..rect.height() as usize {
-            for column in 0..across {
-                let first = pixel * PER_PIXEL * across + column;
-                let part = |k: usize| fold(taps, self.rows[first..].iter().step_by(across).map(|r| r[k]));
-                let ([sum, rows], [columns, fields]) = (part(0), part(1));
-                // Halves are the sum plus and minus these.
-                let spread = rows.map(f32::abs) + columns.map(f32::abs) + fields.map(f32::abs);
-                let close = spread.max_component() <= TOLERANCE * sum.map(f32::abs).max_component();
-                self.pixels.push(close.then_some(sum));
-            }
-        }
+    }
+
+    /// The rays of all points.
+    fn aim(&mut self, scene: &Scene) {
+        self.rays.resize(self.x.len());
+        scene
+            .camera
+            .fill_rays(&FilmSamples { x: &self.x, y: &self.y, lens_u: &[], lens_v: &[] }, &mut self.rays);
     }
 
     /// The radiance of all points.
     fn look_up(&mut self, scene: &Scene) {
         let n = self.x.len();
-        self.rays.resize(n);
-        scene
-            .camera
-            .fill_rays(&FilmSamples { x: &self.x, y: &self.y, lens_u: &[], lens_v: &[] }, &mut self.rays);
         self.li.clear();
         self.li.resize(n, Rgb::BLACK);
         for (k, &light) in scene.lights.at_infinity.iter().enumerate() {
@@ -150,14 +213,54 @@ impl Backdrop {
     }
 }
 
-/// The weighted sum, and half of the difference of the halves.
-fn fold(taps: &[[f32; 2]], points: impl Iterator<Item = Rgb>) -> [Rgb; 2] {
-    let mut sums = [Rgb::BLACK; 2];
-    for (tap, point) in taps.iter().zip(points) {
-        sums[0] += point * tap[0];
-        sums[1] += point * tap[1];
+/// Whether the sky is without detail in what rows of `n` directions span: a cone about the mean of its corners.
+fn is_smooth(scene: &Scene, w: Directions, n: usize) -> bool {
+    let corners = [0, n - 1, w.len() - n, w.len() - 1].map(|i| w.get(i));
+    let axis = corners.iter().sum::<Vec3>().normalize_or_zero();
+    let chord = corners.iter().fold(0.0, |most: f32, c| most.max((*c - axis).length()));
+    scene.lights.is_smooth(axis, 2.0 * (0.5 * chord).min(1.0).asin())
+}
+
+/// Weighted sums down columns of numbers, and halves of the differences of their halves.
+struct FoldDown<'a> {
+    taps: &'a [[f32; 2]],
+    /// As many rows as taps.
+    row: &'a [f32],
+    sums: &'a mut [f32],
+    halves: &'a mut [f32],
+}
+
+impl simd::Kernel for FoldDown<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.sums.fill(0.0);
+        self.halves.fill(0.0);
+        for (tap, row) in self.taps.iter().zip(self.row.chunks_exact(self.sums.len())) {
+            for ((sum, half), value) in self.sums.iter_mut().zip(self.halves.iter_mut()).zip(row) {
+                *sum += value * tap[0];
+                *half += value * tap[1];
+            }
+        }
     }
-    sums
+}
+
+/// Pixel `x` of what [`FoldDown`] gives, if its halves agree.
+#[inline]
+fn fold(taps: &[[f32; 2]], [sums, halves]: [&[f32]; 2], x: usize) -> Option<Rgb> {
+    let [mut sum, mut columns, mut rows, mut fields] = [Vec4::ZERO; 4];
+    for (i, tap) in (x * PER_PIXEL..).zip(taps) {
+        let (s, h) = (Vec4::from_slice(&sums[3 * i..]), Vec4::from_slice(&halves[3 * i..]));
+        sum += s * tap[0];
+        columns += s * tap[1];
+        rows += h * tap[0];
+        fields += h * tap[1];
+    }
+    // Halves are the sum plus and minus these.
+    let spread = rows.abs() + columns.abs() + fields.abs();
+    let close = spread.truncate().max_element() <= TOLERANCE * sum.abs().truncate().max_element();
+    close.then(|| Rgb::new(sum.x, sum.y, sum.z))
 }
 
 #[cfg(test)]
