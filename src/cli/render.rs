@@ -69,7 +69,7 @@ struct SamplingArgs {
     /// everywhere [default: integrate]
     #[arg(long, value_name = "integrate|sample")]
     sky_pixels: Option<SkyPixels>,
-    /// Samples of pixels that outlines run through, at most, for each of another's (1: as many) [default: 8]
+    /// Samples of pixels that outlines run through, at most, for each of another's (1: as many) [default: 4]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
     outlines: Option<u32>,
     /// Seed of every random choice [default: 0]

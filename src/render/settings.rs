@@ -11,7 +11,7 @@ use crate::scene::desc::SceneDesc;
 use std::time::Duration;
 
 /// See [`RenderSettings::outlines`]: more would gain little, as the error of an edge falls as the power 1.5 of samples.
-pub const OUTLINES: u32 = 8;
+pub const OUTLINES: u32 = 4;
 /// Most of that.
 pub const MOST_OUTLINES: u32 = 64;
 

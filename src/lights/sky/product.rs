@@ -43,17 +43,14 @@ use weigh::{About, Columns, Even, Facets};
 const WIDTHS: usize = 12;
 /// Kinds of surfaces.
 const KINDS: usize = 1 + WIDTHS;
-/// Sets of tables with all kinds: for light samples alone, so many at once as [`Set`] tells apart, and for those that have
-/// help.
-const SETS: usize = 7;
+/// Sets of tables with all kinds, see [`Set`].
+const SETS: usize = 4;
 /// The kind of tables for those who know nothing of the surface: all of the light on an even one, its peaks whole.
 const PLAIN: usize = SETS * KINDS;
 /// What counts as a peak: a cell of so many times the mean radiance.
 const PEAK: f64 = 32.0;
 /// The cosine of the largest angle between peaks and their middle where all of them are seen or hidden together: 5 degrees.
 const TOGETHER: f64 = 0.9962;
-/// Light samples of which peaks have at least this part are all for them.
-const PEAKS_ALONE: f32 = 0.9;
 /// Light samples that have help find nothing where less than this part of the light is left for them.
 const LEAST_LEFT: f64 = 1e-3;
 /// A light sample that has help is taken so many times as often as the part of the light that is left for it: at a
@@ -108,38 +105,31 @@ pub(super) enum Choice {
 
 /// What tells sets of tables apart.
 ///
-/// Peaks may have no more than a part of a table's weight. A sun that is hidden leaves all to the other cells, which must
-/// not go without samples: half of the samples are for them, or where one peak is all there is, and several samples are
-/// taken, all but one. Parts are powers of two, at which stratified points are best: of n samples exactly one goes there.
+/// Peaks may have no more than a part of the weight of tables for light samples alone. A sun that is hidden leaves all to the
+/// other cells, which must not go without samples: half of the samples are for them, or all but one of several where there
+/// is one peak. Parts are powers of two, at which stratified points are best: of n samples exactly one goes there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Set {
-    alone: bool,
-    /// Samples taken together: the power of two at most that, up to 8.
-    bits: u32,
+enum Set {
+    /// Of so many samples at once one may be for peaks, as a power of two from 1 to 3.
+    Alone(u32),
+    /// Scattered rays compete.
+    Helped,
 }
 
 impl Set {
     fn of(lobes: &Lobes) -> Self {
-        let bits = lobes.samples.clamp(1, 8).ilog2();
-        // One sample or two that are alone are treated alike.
-        Set { alone: lobes.alone, bits: if lobes.alone { bits.max(1) } else { bits } }
+        if lobes.alone { Set::Alone(lobes.samples.clamp(2, 8).ilog2()) } else { Set::Helped }
     }
 
     fn number(self) -> usize {
-        if self.alone { self.bits as usize - 1 } else { 3 + self.bits as usize }
-    }
-
-    fn numbered(number: usize) -> Self {
-        match number {
-            0..3 => Set { alone: true, bits: number as u32 + 1 },
-            _ => Set { alone: false, bits: number as u32 - 3 },
+        match self {
+            Set::Alone(bits) => bits as usize - 1,
+            Set::Helped => SETS - 1,
         }
     }
 
-    /// Most of a table's weight that peaks may have together; all if 1.
-    fn most_of_all(self, is_one_peak: bool) -> f32 {
-        let bits = if is_one_peak { self.bits } else { self.bits.min(1) };
-        0.5f32.powi(bits as i32)
+    fn numbered(number: usize) -> Self {
+        if number < SETS - 1 { Set::Alone(number as u32 + 1) } else { Set::Helped }
     }
 }
 
@@ -229,37 +219,28 @@ impl ProductTable {
     #[inline]
     pub fn prepare(&self, at: &Receiver, lobes: &Lobes, guide: &mut Guide) -> bool {
         let s = &lobes.scattering;
-        let set = Set::of(lobes);
-        let first = set.number() * KINDS;
+        let first = Set::of(lobes).number() * KINDS;
         let number = |kind: usize, which: usize| ((first + kind) * OF_KIND + which) as u32;
         let even = number(0, if at.ns == Vec3::ZERO { ALL_ROUND } else { octahedron::find(at.ns) });
         if s.facets <= 0.0 || at.ns == Vec3::ZERO {
             guide.tables = [even; 2];
             guide.shares = [1.0, 0.0];
             let table = self.table(even);
-            guide.worth = table.map_or(0.0, |t| worth(t.total, t.whole) * self.rarely(set, t.peaks, t.total));
+            guide.worth = table.map_or(0.0, |t| worth(t.total, t.whole));
             return table.is_some();
         }
         let mirrored = (2.0 * at.ns.dot(lobes.wo) * at.ns - lobes.wo).normalize_or(at.ns);
         let facets = number(1 + width_of(s.alpha), octahedron::find(mirrored));
         let sums = |number: u32, part: f32| match self.table(number) {
-            Some(t) if part > 0.0 => [t.total, t.whole, t.peaks].map(|sum| part * sum),
-            _ => [0.0; 3],
+            Some(t) if part > 0.0 => [part * t.total, part * t.whole],
+            _ => [0.0; 2],
         };
         let (of_even, of_facets) = (sums(even, s.even), sums(facets, s.facets));
         let sum = of_even[0] + of_facets[0];
         guide.tables = [even, facets];
         guide.shares = [of_even[0] / sum, of_facets[0] / sum];
-        guide.worth =
-            worth(sum, of_even[1] + of_facets[1]) * self.rarely(set, of_even[2] + of_facets[2], sum);
+        guide.worth = worth(sum, of_even[1] + of_facets[1]);
         sum > 0.0 && sum.is_finite()
-    }
-
-    /// Of several samples one is enough for a peak, where they are for nothing else: how often each is taken.
-    #[inline]
-    fn rarely(&self, set: Set, peaks: f32, total: f32) -> f32 {
-        let for_peaks = self.is_one_peak && !set.alone && peaks > PEAKS_ALONE * total;
-        if for_peaks { set.most_of_all(true) } else { 1.0 }
     }
 
     /// The table of a number; None if all is black there. After the first time, two loads.
@@ -285,11 +266,11 @@ impl ProductTable {
             }
         }
         let sum = |of: &[f32]| of.iter().zip(&weights).map(|(x, w)| f64::from(x * w)).sum::<f64>();
-        let set = Set::numbered(kind / KINDS);
-        if kind == PLAIN || set.alone {
+        let set = if kind == PLAIN { None } else { Some(Set::numbered(kind / KINDS)) };
+        if set != Some(Set::Helped) {
             weights.iter_mut().zip(&cells.flux).for_each(|(w, flux)| *w *= flux);
-            if kind != PLAIN {
-                self.limit_peaks(set, &mut weights);
+            if let Some(Set::Alone(bits)) = set {
+                self.limit_peaks(if self.is_one_peak { bits } else { 1 }, &mut weights);
             }
         } else {
             let (flux, angle) = (sum(&cells.flux), sum(&cells.angle));
@@ -301,22 +282,18 @@ impl ProductTable {
             if left < LEAST_LEFT * flux {
                 return None;
             }
-            let peaks: f32 = self.peaks.iter().map(|&i| weights[i]).sum();
-            if peaks <= PEAKS_ALONE * left as f32 {
-                self.limit_peaks(set, &mut weights);
-            }
             let mut table = Table::new(&weights, &self.places(axis, &weights))?;
-            (table.total, table.whole, table.peaks) = (left as f32, flux as f32, peaks);
+            table.whole = flux as f32;
             return Some(table);
         }
         Table::new(&weights, &self.places(axis, &weights))
     }
 
-    /// Takes from the peaks what they have beyond their part.
-    fn limit_peaks(&self, set: Set, weights: &mut [f32]) {
+    /// Takes from the peaks what they have beyond their part, one over a power of two.
+    fn limit_peaks(&self, bits: u32, weights: &mut [f32]) {
         let peaks: f32 = self.peaks.iter().map(|&i| weights[i]).sum();
         let rest = weights.iter().sum::<f32>() - peaks;
-        let part = set.most_of_all(self.is_one_peak);
+        let part = 0.5f32.powi(bits as i32);
         let most = rest * part / (1.0 - part);
         if rest > 0.0 && peaks > most {
             self.peaks.iter().for_each(|&i| weights[i] *= most / peaks);

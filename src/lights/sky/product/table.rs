@@ -28,8 +28,6 @@ pub(super) struct Table {
     pub total: f32,
     /// Sum of what the weights would be if nothing else found the light.
     pub whole: f32,
-    /// Of `total`, what peaks have; told by whoever knows them, else 0.
-    pub peaks: f32,
 }
 
 /// Where a cell lies in a plane in which neighbours on the sphere are close, and how.
@@ -231,7 +229,6 @@ impl Table {
             units: units.into(),
             total,
             whole: total,
-            peaks: 0.0,
         }))
     }
 
