@@ -194,8 +194,10 @@ pub struct PilotPlan<'a> {
     pub seed: u64,
     /// Kind of its points.
     pub kind: Sampler,
-    /// Pixels that do not count, as they will take more samples than others.
+    /// Pixels that take more samples than others.
     pub is_outline: &'a (dyn Fn(u32, u32) -> bool + Sync),
+    /// How many for each of another's.
+    pub outline_times: u32,
 }
 
 /// An integrator that has adapted to a scene.

@@ -37,6 +37,8 @@ const SEED: u64 = 0x7069_6c6f_7400_0000;
 /// Part of the squared mean that is added to a pixel's own, as in relMSE: what a dark pixel counts for.
 const EPSILON: f64 = 0.01;
 
+/// How steeply those of outlines fall by themselves: what is smooth along them is stratified.
+const OUTLINE_SLOPE: f64 = 1.5;
 /// How steeply squared errors fall with the number of samples: the exponent at which cost counts against variance.
 const SLOPE: f64 = 1.2;
 
@@ -112,13 +114,15 @@ struct Classes<'a> {
     list: Vec<Class<'a>>,
     /// Pixels in whose middle there is no surface.
     bare: Vec<[u32; 2]>,
+    /// Pixels that outlines run through.
+    outlined: Vec<[u32; 2]>,
     /// By object, then slot.
     of: Vec<Vec<usize>>,
 }
 
 impl<'a> Classes<'a> {
     fn new(scene: &'a Scene) -> Self {
-        let mut all = Classes { list: Vec::new(), bare: Vec::new(), of: Vec::new() };
+        let mut all = Classes { list: Vec::new(), bare: Vec::new(), outlined: Vec::new(), of: Vec::new() };
         let mut by_address = std::collections::HashMap::new();
         for object in &scene.objects {
             let slots = object.materials.iter().map(|material| {
@@ -156,7 +160,11 @@ pub(super) fn choose(tracer: &PathTracer, scene: &Scene, plan: &PilotPlan) -> Op
         rays.camera += scout(scene, plan, scouts, &mut classes);
     }
     let most = (affordable / classes.list.len().max(1)).min(MOST);
-    let bare = Bare::new(tracer, scene, plan, &mut classes.bare, affordable.min(MOST));
+    let mut bare = Bare::default();
+    if affordable >= LEAST {
+        bare.add(scene, plan, tracer, &classes.bare, 1);
+        bare.add(scene, plan, tracer, &classes.outlined, plan.outline_times);
+    }
     rays.add(&bare.rays);
     for class in classes.list.iter_mut().filter(|c| !c.material.is_delta() && !c.material.is_black()) {
         if class.pixels.len().min(most) < LEAST {
@@ -169,8 +177,8 @@ pub(super) fn choose(tracer: &PathTracer, scene: &Scene, plan: &PilotPlan) -> Op
             continue;
         }
         let area = class.pixels.len() as f64;
-        thin(&mut class.pixels, most);
-        let run = |s: &Strategy| Trial::run(tracer, scene, plan, &class.pixels, *s);
+        let pixels = thinned(&class.pixels, most);
+        let run = |s: &Strategy| Trial::run(tracer, scene, plan, &pixels, *s);
         let trials: Vec<Trial> = candidates.iter().map(run).collect();
         class.strategy = best(&trials, area, &bare);
         trials.iter().for_each(|t| rays.add(&t.rays));
@@ -183,12 +191,10 @@ pub(super) fn choose(tracer: &PathTracer, scene: &Scene, plan: &PilotPlan) -> Op
     Some(Specialised { integrator, decided: describe(scene, &classes), rays })
 }
 
-/// Keeps about `most`, evenly.
-fn thin(pixels: &mut Vec<[u32; 2]>, most: usize) {
+/// About `most` of them, evenly.
+fn thinned(pixels: &[[u32; 2]], most: usize) -> Vec<[u32; 2]> {
     let n = pixels.len();
-    if n > most {
-        *pixels = (0..most).map(|i| pixels[i * n / most]).collect();
-    }
+    if n > most { (0..most).map(|i| pixels[i * n / most]).collect() } else { pixels.to_vec() }
 }
 
 /// Notes which pixels of a lattice show which material; returns the rays that took.
@@ -198,7 +204,9 @@ fn scout(scene: &Scene, plan: &PilotPlan, scouts: usize, classes: &mut Classes) 
     let lattice = |from: u32, to: u32| (from + step / 2..to).step_by(step as usize);
     let rect = plan.pixels;
     let pixels = lattice(rect.y0, rect.y1).flat_map(|y| lattice(rect.x0, rect.x1).map(move |x| [x, y]));
-    let pixels: Vec<[u32; 2]> = pixels.filter(|[x, y]| !(plan.is_outline)(*x, *y)).collect();
+    let (outlined, pixels): (Vec<[u32; 2]>, Vec<[u32; 2]>) =
+        pixels.partition(|[x, y]| (plan.is_outline)(*x, *y));
+    classes.outlined = outlined;
     let coordinate = |axis: usize| pixels.iter().map(|p| p[axis] as f32 + 0.5).collect::<Vec<f32>>();
     let (x, y, half) = (coordinate(0), coordinate(1), vec![0.5; pixels.len()]);
     let lens: &[f32] = if scene.camera.has_lens() { &half } else { &[] };
@@ -224,8 +232,9 @@ fn scout(scene: &Scene, plan: &PilotPlan, scouts: usize, classes: &mut Classes) 
     pixels.len() as u64
 }
 
-/// The pixels without a surface, whose noise is that of the sky's picture and of outlines: only more camera rays lower it,
-/// and each that has to carry many light samples elsewhere is dear.
+/// Pixels whose noise only more camera rays lower, which are dear where each carries many light samples: those without a
+/// surface, whose noise is that of the sky's picture, and outlines.
+#[derive(Default)]
 struct Bare {
     /// Sum over the lattice's pixels of their squared relative errors.
     error: f64,
@@ -236,23 +245,19 @@ struct Bare {
 }
 
 impl Bare {
-    fn new(
-        tracer: &PathTracer,
-        scene: &Scene,
-        plan: &PilotPlan,
-        pixels: &mut Vec<[u32; 2]>,
-        most: usize,
-    ) -> Self {
-        let area = pixels.len() as f64;
-        if pixels.is_empty() || most < LEAST {
-            return Bare { error: 0.0, cost: 0.0, rays: RayCounts::default() };
+    /// Adds pixels that take so many `times` the samples of others.
+    fn add(&mut self, scene: &Scene, plan: &PilotPlan, tracer: &PathTracer, pixels: &[[u32; 2]], times: u32) {
+        if pixels.is_empty() {
+            return;
         }
-        thin(pixels, most);
+        let (area, times) = (pixels.len() as f64, f64::from(times));
         // What is on the outlines may be of any kind.
-        let trial = Trial::run(tracer, scene, plan, pixels, Strategy::Both(1));
+        let trial = Trial::run(tracer, scene, plan, &thinned(pixels, MOST), Strategy::Both(1));
         let means = means(std::slice::from_ref(&trial));
         let each = 2.0 * f64::from(SAMPLES);
-        Bare { error: area * trial.error(&means), cost: area * each * BARE_COST, rays: trial.rays }
+        self.error += area * trial.error(&means) / times.powf(OUTLINE_SLOPE);
+        self.cost += area * times * each * BARE_COST;
+        self.rays.add(&trial.rays);
     }
 }
 

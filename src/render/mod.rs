@@ -75,7 +75,7 @@ pub struct OutlineStats {
 pub struct RenderStats {
     /// Seconds from the first ray to the last.
     pub seconds: f64,
-    /// Samples a pixel in the film, the most.
+    /// Samples a pixel in the film, the most but for outlines.
     pub spp: u32,
     /// The fewest; fewer where samples went by need.
     pub spp_least: u32,
@@ -151,8 +151,14 @@ impl Renderer {
         let outlines = if s.spp > 1 { Outlines::of(scene, crop, s.outlines) } else { None };
         scene.kernel.take_failure()?;
         let is_outline = |x, y| outlines.as_ref().is_some_and(|o| o.contains(x, y));
-        let plan =
-            PilotPlan { pixels: crop, spp: s.spp, seed: s.seed, kind: s.sampler, is_outline: &is_outline };
+        let plan = PilotPlan {
+            pixels: crop,
+            spp: s.spp,
+            seed: s.seed,
+            kind: s.sampler,
+            is_outline: &is_outline,
+            outline_times: outlines.as_ref().map_or(1, Outlines::times),
+        };
         let adapted = if s.pilot { self.integrator.specialise(scene, &plan) } else { None };
         let integrator = match adapted {
             Some(Specialised { integrator, decided, rays }) => {

@@ -17,6 +17,7 @@ mod layers;
 mod light;
 mod matches;
 mod open_house;
+mod outlines;
 mod pictures;
 mod points;
 mod product;

@@ -59,7 +59,7 @@ fn the_more_outlines_the_fewer_samples_each() {
     };
     assert_eq!(times(1, 1), 1);
     assert_eq!(times(6, 1), 4);
-    assert_eq!(times(64, 1), 32);
+    assert_eq!(times(64, 1), 64);
     let crowd = times(64, 48);
     assert!((2..8).contains(&crowd), "{crowd}");
 }

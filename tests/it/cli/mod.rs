@@ -58,8 +58,15 @@ fn pictures_and_statistics_are_written() {
     assert!(run.stderr.contains("2 triangles") && run.stderr.contains("Mrays/s"), "{}", run.stderr);
     let stats = f.json("s.json");
     let count = |section: &str, name: &str| stats[section][name].as_u64().unwrap();
-    assert_eq!(count("rays", "camera") + count("skipped", "samples"), 8 * 6 * 2);
-    assert_eq!(stats["samples"], 8 * 6 * 2);
+    let outlined = count("outlines", "pixels") * (count("outlines", "times") - 1);
+    assert!(outlined > 0);
+    assert_eq!(stats["samples"], (8 * 6 + outlined) * 2);
+    // Rays through all corners of pixels have found the outlines.
+    let rays = count("rays", "camera") + count("skipped", "samples");
+    assert_eq!(rays, (8 * 6 + outlined) * 2 + 9 * 7);
+    f.run("render scene.toml -o a.exr -o b.png --outlines 1 --stats s.json --aov albedo,normal").succeeds();
+    let stats = f.json("s.json");
+    assert_eq!((&stats["samples"], &stats["outlines"]["pixels"]), (&(8 * 6 * 2).into(), &0.into()));
     assert_eq!(stats["scene"]["triangles"], 2);
     assert!(stats["versions"]["kernel"].is_string());
     assert_eq!(f.names(), ["a.exr", "b.png", "s.json", "scene.toml", "tri.ply"]);
