@@ -12,7 +12,7 @@ pub struct Rounds {
     rounds: u32,
     spp_min: u32,
     spp_mean: f64,
-    spp_max: u64,
+    spp_max: u32,
     target: Option<TargetRecord>,
 }
 
@@ -30,7 +30,7 @@ struct TargetRecord {
 impl Rounds {
     /// `None` where one round of so many samples was asked for.
     pub fn new(rendered: &Rendered, settings: &RenderSettings) -> Option<Rounds> {
-        let (stats, film) = (&rendered.stats, &rendered.film);
+        let stats = &rendered.stats;
         let target = settings.target.zip(stats.reached).map(|(t, r)| TargetRecord {
             target_error: t.error,
             confidence: t.confidence,
@@ -42,9 +42,8 @@ impl Rounds {
         (target.is_some() || settings.time.is_some()).then(|| Rounds {
             rounds: stats.rounds,
             spp_min: stats.spp_least,
-            spp_mean: stats.samples as f64 / settings.crop.area() as f64,
-            // Outlines take more than the rounds know of.
-            spp_max: film.window().pixels().map(|(x, y)| film.sample_count(x, y)).max().unwrap_or(0),
+            spp_mean: stats.spp_mean,
+            spp_max: stats.spp,
             target,
         })
     }

@@ -79,6 +79,8 @@ pub struct RenderStats {
     pub spp: u32,
     /// The fewest; fewer where samples went by need.
     pub spp_least: u32,
+    /// Their mean over pixels.
+    pub spp_mean: f64,
     /// Rounds begun: 1, unless a clock or a target decides.
     pub rounds: u32,
     /// How good the picture is, where there was a target.
@@ -199,6 +201,7 @@ impl Renderer {
         schedule.look(&out.film);
         let stats = &mut out.stats;
         [stats.spp_least, stats.spp] = schedule.spp_range();
+        stats.spp_mean = schedule.spp_mean();
         stats.rounds = schedule.rounds;
         stats.reached = schedule.reached;
         stats.seconds = start.elapsed().as_secs_f64();

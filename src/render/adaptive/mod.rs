@@ -257,6 +257,12 @@ impl Schedule {
         [spp().min().unwrap_or(0), spp().max().unwrap_or(0)]
     }
 
+    /// The mean over pixels.
+    pub fn spp_mean(&self) -> f64 {
+        let sum = |of: fn(&Tile) -> f64| self.tiles.iter().map(of).sum::<f64>();
+        sum(|t| t.area * f64::from(t.spp)) / sum(|t| t.area).max(1.0)
+    }
+
     fn judge(&self, target: &Target, needs: &[Need]) -> Reached {
         let [square, bound] = match target.part {
             Part::Picture => {
