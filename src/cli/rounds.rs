@@ -39,7 +39,7 @@ impl Rounds {
             error_at_most: r.at_most,
             met: r.met,
         });
-        (target.is_some() || settings.time.is_some()).then(|| Rounds {
+        (target.is_some() || settings.time.is_some()).then_some(Rounds {
             rounds: stats.rounds,
             spp_min: stats.spp_least,
             spp_mean: stats.spp_mean,
