@@ -16,6 +16,8 @@
 //! brighter than the mean of what the surface sees (Karlik et al., "MIS Compensation: Optimizing Sampling Techniques in
 //! Multiple Importance Sampling", 2019, but for each table, not for the whole sky).
 //!
+//! Within a cell places are drawn by the sky alone ([`inner`]), where it varies there: stars are smaller than cells.
+//!
 //! Weights may be wrong by any factor and only cost variance, as long as none is zero where
 //! light is scattered that nothing else finds.
 
