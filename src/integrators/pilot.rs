@@ -162,8 +162,9 @@ pub(super) fn choose(tracer: &PathTracer, scene: &Scene, plan: &PilotPlan) -> Op
     let most = (affordable / classes.list.len().max(1)).min(MOST);
     let mut bare = Bare::default();
     if affordable >= LEAST {
-        bare.add(scene, plan, tracer, &classes.bare, 1);
-        bare.add(scene, plan, tracer, &classes.outlined, plan.outline_times);
+        let most = affordable.min(MOST);
+        bare.add(tracer, scene, plan, (&classes.bare, most), 1);
+        bare.add(tracer, scene, plan, (&classes.outlined, most), plan.outline_times);
     }
     rays.add(&bare.rays);
     for class in classes.list.iter_mut().filter(|c| !c.material.is_delta() && !c.material.is_black()) {
@@ -245,14 +246,21 @@ struct Bare {
 }
 
 impl Bare {
-    /// Adds pixels that take so many `times` the samples of others.
-    fn add(&mut self, scene: &Scene, plan: &PilotPlan, tracer: &PathTracer, pixels: &[[u32; 2]], times: u32) {
+    /// Adds pixels that take so many `times` the samples of others, by trying out so many of them at most.
+    fn add(
+        &mut self,
+        tracer: &PathTracer,
+        scene: &Scene,
+        plan: &PilotPlan,
+        (pixels, most): (&[[u32; 2]], usize),
+        times: u32,
+    ) {
         if pixels.is_empty() {
             return;
         }
         let (area, times) = (pixels.len() as f64, f64::from(times));
         // What is on the outlines may be of any kind.
-        let trial = Trial::run(tracer, scene, plan, &thinned(pixels, MOST), Strategy::Both(1));
+        let trial = Trial::run(tracer, scene, plan, &thinned(pixels, most), Strategy::Both(1));
         let means = means(std::slice::from_ref(&trial));
         let each = 2.0 * f64::from(SAMPLES);
         self.error += area * trial.error(&means) / times.powf(OUTLINE_SLOPE);
