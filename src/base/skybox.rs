@@ -2,6 +2,7 @@
 
 use crate::base::directions::{Directions, LANES};
 use crate::color::Rgb;
+use crate::math::simd::{Kernel, dispatch};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -47,6 +48,30 @@ impl ChartLanes {
     #[inline(always)]
     pub fn get(&self, k: usize) -> ChartPoint {
         ChartPoint { chart: self.chart[k], u: self.u[k], v: self.v[k] }
+    }
+
+    /// What `toward`, which has to be inlined always, makes of all points, in vector code.
+    #[inline]
+    pub fn directions(&self, toward: impl Fn(ChartPoint) -> (DVec3, f64)) -> ChartDirections {
+        dispatch(Toward { at: self, toward })
+    }
+}
+
+struct Toward<'a, F> {
+    at: &'a ChartLanes,
+    toward: F,
+}
+
+impl<F: Fn(ChartPoint) -> (DVec3, f64)> Kernel for Toward<'_, F> {
+    type Output = ChartDirections;
+
+    #[inline(always)]
+    fn run(self) -> ChartDirections {
+        let mut out = ChartDirections::default();
+        for k in 0..LANES {
+            out.set(k, (self.toward)(self.at.get(k)));
+        }
+        out
     }
 }
 

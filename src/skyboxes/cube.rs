@@ -5,7 +5,7 @@
 
 use super::texel::{self, CellSums, Spread};
 use super::tiles::{self, CHUNK, Footprint, Footprints, Strides, Tiles};
-use crate::base::directions::{Directions, LANES};
+use crate::base::directions::Directions;
 use crate::base::image_data::{ImageData, Texels};
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::base::skybox::{ChartDirections, ChartGrid, ChartLanes, ChartPoint, Skybox, integrate_cells};
@@ -251,21 +251,6 @@ fn toward(c: ChartPoint) -> (DVec3, f64) {
     (DVec3::new(x, y, z) * r, 4.0 * r * r * r)
 }
 
-struct Toward<'a>(&'a ChartLanes);
-
-impl simd::Kernel for Toward<'_> {
-    type Output = ChartDirections;
-
-    #[inline(always)]
-    fn run(self) -> ChartDirections {
-        let mut out = ChartDirections::default();
-        for k in 0..LANES {
-            out.set(k, toward(self.0.get(k)));
-        }
-        out
-    }
-}
-
 /// Looks up a batch.
 struct Lookups<'a> {
     cube: &'a Cube,
@@ -362,7 +347,7 @@ impl Skybox for Cube {
     }
 
     fn directions_and_densities(&self, at: &ChartLanes, _n: usize) -> ChartDirections {
-        simd::dispatch(Toward(at))
+        at.directions(toward)
     }
 
     fn cell_integrals(&self, grid: ChartGrid) -> Vec<f64> {

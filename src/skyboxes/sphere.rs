@@ -5,7 +5,7 @@
 mod lookups;
 
 use super::texel::{self, CellSums, Spread, Tap};
-use crate::base::directions::{Directions, LANES};
+use crate::base::directions::Directions;
 use crate::base::image_data::ImageData;
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::base::skybox::{ChartDirections, ChartGrid, ChartLanes, ChartPoint, Skybox};
@@ -94,21 +94,6 @@ fn toward(c: ChartPoint) -> (DVec3, f64) {
     (DVec3::new(-p.sin * a.cos, p.cos, -p.sin * a.sin), TAU * PI * p.sin)
 }
 
-struct Toward<'a>(&'a ChartLanes);
-
-impl simd::Kernel for Toward<'_> {
-    type Output = ChartDirections;
-
-    #[inline(always)]
-    fn run(self) -> ChartDirections {
-        let mut out = ChartDirections::default();
-        for k in 0..LANES {
-            out.set(k, toward(self.0.get(k)));
-        }
-        out
-    }
-}
-
 impl Skybox for Sphere {
     #[inline]
     fn radiance(&self, d: Vec3) -> Rgb {
@@ -150,7 +135,7 @@ impl Skybox for Sphere {
     }
 
     fn directions_and_densities(&self, at: &ChartLanes, _n: usize) -> ChartDirections {
-        simd::dispatch(Toward(at))
+        at.directions(toward)
     }
 
     fn cell_integrals(&self, grid: ChartGrid) -> Vec<f64> {
