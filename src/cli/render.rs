@@ -14,7 +14,7 @@ use crate::formats::native::MAX_SIDE;
 use crate::image::write::{check_file, write_file};
 use crate::integrators::Integrator;
 use crate::render::Renderer;
-use crate::render::settings::{RenderSettings, crop_window};
+use crate::render::settings::{MOST_OUTLINES, RenderSettings, crop_window};
 use crate::sampler::Sampler;
 use crate::sampling::filter::PixelFilter;
 use crate::scene::build::{BuildOptions, build as build_scene};
@@ -70,7 +70,7 @@ struct SamplingArgs {
     #[arg(long, value_name = "integrate|sample")]
     sky_pixels: Option<SkyPixels>,
     /// Samples of pixels that outlines run through, at most, for each of another's (1: as many) [default: 4]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_OUTLINES)))]
     outlines: Option<u32>,
     /// Seed of every random choice [default: 0]
     #[arg(long, value_name = "N")]

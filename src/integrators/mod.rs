@@ -14,7 +14,7 @@ mod pending;
 mod pilot;
 mod points;
 mod several;
-mod strategy;
+pub mod strategy;
 mod surface;
 pub mod whitted;
 

@@ -139,7 +139,8 @@ impl Renderer {
         let s = &self.settings;
         let start = Instant::now();
         let crop = s.crop;
-        let bytes_per_pixel = film::BYTES_PER_PIXEL + s.aovs.len() as u64 * layers::BYTES_PER_PIXEL;
+        let bytes_per_pixel =
+            film::BYTES_PER_PIXEL + outlines::BYTES_PER_PIXEL + s.aovs.len() as u64 * layers::BYTES_PER_PIXEL;
         let what = || format!("a film of {} x {}", crop.width(), crop.height());
         // Held to the end: what is written is made only then.
         let _room = memory::room(crop.area() as u64 * bytes_per_pixel, what)?;

@@ -17,6 +17,9 @@ use rayon::prelude::*;
 /// pixels are alike.
 const MOST_MORE: f64 = 0.25;
 
+/// Bytes for each pixel of the picture: its mark, once by tile and once by row.
+pub const BYTES_PER_PIXEL: u64 = 2;
+
 /// Marks by pixel.
 pub struct Outlines {
     rect: PixelRect,
@@ -38,7 +41,8 @@ struct Corners {
 
 impl Outlines {
     /// Of the pixels `rect` of a scene's film, which take up to `most` times the samples of others; None where that is less
-    /// than 2, where there is none, where so much is outline that it would double the work, or where a lens blurs them.
+    /// than 2, where there is none, where twice their samples would be more than a quarter of all on top, or where a lens
+    /// blurs them.
     pub fn of(scene: &Scene, rect: PixelRect, most: u32) -> Option<Self> {
         if most < 2 || scene.camera.has_lens() {
             return None;

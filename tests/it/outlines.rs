@@ -62,7 +62,8 @@ fn outlines_have_less_error_and_no_bias() {
     };
     let [one, more] = [1, 4].map(errors);
     let square = |e: &[f64]| e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64;
-    // As n^-1.5 it would be an eighth; four standard errors of the ratio of two such means allow 2.7 times as much.
+    // As n^-1.5 it would be an eighth. The ratio of two means of 64 squares is uncertain by a quarter of itself (standard
+    // error): a third is more than six of those away.
     assert!(square(&more) < square(&one) / 3.0, "{} {}", square(&one), square(&more));
     let bias = more.iter().sum::<f64>() / more.len() as f64;
     assert!(bias.abs() < 4.5 * (square(&more) / more.len() as f64).sqrt(), "{bias}");

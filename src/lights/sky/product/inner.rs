@@ -12,7 +12,7 @@ use std::collections::BinaryHeap;
 /// Most halves of all cells together. A star takes ten or so.
 const MOST: usize = 1 << 15;
 /// What varies by less is drawn from evenly: its relative variance, a tenth of that of a surface half in the shade. (Halves
-/// of smooth cells would take a tenth of a render's time and hardly lower its error.)
+/// of all cells took a fifth of a render's time for a tenth less squared error, under a photographed sky.)
 const RAGGED: f64 = 0.1;
 /// Nor is a part halved whose variance is less than this part of all light.
 const LEAST: f64 = 1e-6;
