@@ -72,6 +72,10 @@ struct SamplingArgs {
     /// Samples of pixels that outlines run through, at most, for each of another's (1: as many) [default: 4]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_OUTLINES)))]
     outlines: Option<u32>,
+    /// Which pixels the samples go to, where --spp says how many there are on average: those that need them, or all as many
+    /// [default: by-need, from 8 samples on]
+    #[arg(long, value_name = "by-need|even")]
+    dealing: Option<Dealing>,
     /// Seed of every random choice [default: 0]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -113,6 +117,12 @@ impl From<ModeArg> for KernelMode {
 enum SkyPixels {
     Integrate,
     Sample,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Dealing {
+    ByNeed,
+    Even,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -223,6 +233,7 @@ impl SamplingArgs {
             filter: plan.filter.unwrap_or(usual.filter),
             skip_background: self.sky_pixels != Some(SkyPixels::Sample),
             outlines: self.outlines.unwrap_or(usual.outlines),
+            by_need: self.dealing != Some(Dealing::Even),
             threads,
             moments: plan.output.moments,
             aovs: plan.output.aovs.clone(),

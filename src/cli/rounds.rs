@@ -6,7 +6,7 @@ use crate::render::settings::RenderSettings;
 use serde::Serialize;
 use std::fmt;
 
-/// How samples were dealt, where a clock or a target decided.
+/// How samples were dealt, where not all pixels have as many.
 #[derive(Debug, Clone, Serialize)]
 pub struct Rounds {
     rounds: u32,
@@ -39,7 +39,7 @@ impl Rounds {
             error_at_most: r.at_most,
             met: r.met,
         });
-        (target.is_some() || settings.time.is_some()).then_some(Rounds {
+        (target.is_some() || settings.time.is_some() || settings.deals()).then_some(Rounds {
             rounds: stats.rounds,
             spp_min: stats.spp_least,
             spp_mean: stats.spp_mean,

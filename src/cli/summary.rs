@@ -133,7 +133,7 @@ pub struct Record {
     /// Pixels with more samples.
     outlines: OutlineStats,
     msamples_per_second: f64,
-    /// Where a clock or a target decided.
+    /// Where not all pixels have as many samples.
     rounds: Option<Rounds>,
     rays: Rays,
     /// What the integrator decided beforehand.
@@ -156,7 +156,7 @@ impl Record {
             input: input.display().to_string(),
             threads: settings.threads,
             size: settings.size,
-            spp: stats.spp,
+            spp: if settings.deals() { settings.spp } else { stats.spp },
             seed: settings.seed,
             sampler: settings.sampler.name(),
             filter: settings.filter.name(),

@@ -135,6 +135,14 @@ impl PathResults {
     }
 }
 
+/// What is spent on a sample beside its rays, in rays of a shadow's cost.
+const SAMPLE_COST: f64 = 2.0;
+/// The same of a coherent camera ray, a scattered ray with the surface that it may meet, and a shadow ray with its light
+/// sample.
+const RAY_COSTS: [f64; 3] = [0.5, 1.6, 1.6];
+/// What a sample that meets no surface costs in all, in the same.
+pub const BARE_COST: f64 = 0.12;
+
 /// Rays counted by kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RayCounts {
@@ -152,6 +160,22 @@ impl RayCounts {
         self.camera += o.camera;
         self.scattered += o.scattered;
         self.shadow += o.shadow;
+    }
+
+    /// What has been counted since an earlier count.
+    pub fn since(&self, before: &RayCounts) -> RayCounts {
+        RayCounts {
+            camera: self.camera - before.camera,
+            scattered: self.scattered - before.scattered,
+            shadow: self.shadow - before.shadow,
+        }
+    }
+
+    /// What they take with all that goes with them, where they meet surfaces, in shadow rays.
+    pub fn cost(&self) -> f64 {
+        let kinds = [self.camera, self.scattered, self.shadow];
+        self.camera as f64 * SAMPLE_COST
+            + kinds.iter().zip(RAY_COSTS).map(|(n, c)| *n as f64 * c).sum::<f64>()
     }
 
     /// Of all kinds.
@@ -198,6 +222,8 @@ pub struct PilotPlan<'a> {
     pub is_outline: &'a (dyn Fn(u32, u32) -> bool + Sync),
     /// How many for each of another's.
     pub outline_times: u32,
+    /// Whether pixels take samples by their own need, so that what suits a material need not suit others.
+    pub by_need: bool,
 }
 
 /// An integrator that has adapted to a scene.

@@ -8,7 +8,9 @@
 
 use super::path::PathTracer;
 use super::strategy::{Strategies, Strategy};
-use super::{CameraBatch, Integrator, PathId, PathResults, PilotPlan, RayCounts, Specialised, Workspace};
+use super::{
+    BARE_COST, CameraBatch, Integrator, PathId, PathResults, PilotPlan, RayCounts, Specialised, Workspace,
+};
 use crate::base::camera::FilmSamples;
 use crate::base::hit::HitBatch;
 use crate::base::material::{Material, Prepared};
@@ -41,14 +43,6 @@ const EPSILON: f64 = 0.01;
 const OUTLINE_SLOPE: f64 = 1.5;
 /// How steeply squared errors fall with the number of samples: the exponent at which cost counts against variance.
 const SLOPE: f64 = 1.2;
-
-/// What is spent on a sample beside its rays, in rays of a shadow's cost.
-const SAMPLE_COST: f64 = 2.0;
-/// The same of a coherent camera ray, a scattered ray with the surface that it may meet, and a shadow ray with its light
-/// sample.
-const RAY_COSTS: [f64; 3] = [0.5, 1.6, 1.6];
-/// What a sample that meets no surface costs in all, in the same.
-const BARE_COST: f64 = 0.12;
 
 /// Most contrast of a light that scattered rays, or light samples that know little of narrow lobes, are trusted with.
 /// A pilot of thousands of samples overlooks what is met by one in some hundreds at most; at this contrast that is worth
@@ -161,7 +155,7 @@ pub(super) fn choose(tracer: &PathTracer, scene: &Scene, plan: &PilotPlan) -> Op
     }
     let most = (affordable / classes.list.len().max(1)).min(MOST);
     let mut bare = Bare::default();
-    if affordable >= LEAST {
+    if affordable >= LEAST && !plan.by_need {
         let most = affordable.min(MOST);
         bare.add(tracer, scene, plan, (&classes.bare, most), 1);
         bare.add(tracer, scene, plan, (&classes.outlined, most), plan.outline_times);
@@ -308,13 +302,6 @@ impl Trial {
         });
         squares.sum::<f64>() / pixels
     }
-
-    /// Counted, in rays of a shadow's cost.
-    fn cost(&self) -> f64 {
-        let samples = self.rays.camera as f64;
-        let kinds = [self.rays.camera, self.rays.scattered, self.rays.shadow];
-        samples * SAMPLE_COST + kinds.iter().zip(RAY_COSTS).map(|(n, c)| *n as f64 * c).sum::<f64>()
-    }
 }
 
 /// The means of both halves of some pixels. The camera's rays are spread over the pixel: what its surfaces differ by is
@@ -368,7 +355,7 @@ fn best(trials: &[Trial], area: f64, bare: &Bare) -> Strategy {
     let pixels = means.len().max(1) as f64;
     let score = |t: &Trial| {
         let error = area * t.error(&means) + bare.error;
-        error * (area * t.cost() / pixels + bare.cost).powf(SLOPE)
+        error * (area * t.rays.cost() / pixels + bare.cost).powf(SLOPE)
     };
     let scores = (0..).zip(trials).map(|(i, t)| (score(t) * if i == 0 { MARGIN } else { 1.0 }, t));
     let found = scores.min_by(|a, b| a.0.total_cmp(&b.0)).map(|s| s.1);

@@ -1,7 +1,9 @@
 //! The unit of work of a thread: a tile of pixels, its samples dealt out in batches of camera rays.
 
+use super::adaptive::Task;
 use super::backdrop::Backdrop;
 use super::coverage::Coverage;
+use super::dealing::{Counts, Kind, Note, Spent};
 use super::film::{FilmTile, REPLICATES};
 use super::layers::Layers;
 use super::outlines::Outlines;
@@ -64,6 +66,10 @@ pub struct Worker {
     pub work: Workspace,
     /// Samples that were not finite, the first few.
     pub bad: Vec<BadSample>,
+    /// What the tile's pixels showed, row by row, and what that took; where [`Job::notes`] asks for it.
+    pub notes: Vec<Note>,
+    /// See `notes`.
+    pub spent: Spent,
 }
 
 /// What all tiles of a render share.
@@ -81,6 +87,10 @@ pub struct Job<'a> {
     pub coverage: Option<&'a Coverage>,
     /// Which pixels take more samples.
     pub outlines: Option<Outlined<'a>>,
+    /// Whether workers note what pixels show.
+    pub notes: bool,
+    /// How many samples each pixel gets in all, if not all as many.
+    pub counts: Option<&'a Counts>,
 }
 
 /// See [`Job::outlines`].
@@ -95,7 +105,25 @@ pub struct Outlined<'a> {
 impl<'a> Job<'a> {
     /// With a ray for every sample.
     pub fn new(scene: &'a Scene, integrator: &'a dyn Integrator, settings: &'a RenderSettings) -> Self {
-        Job { scene, integrator, settings, points: settings.points(), coverage: None, outlines: None }
+        Job {
+            scene,
+            integrator,
+            settings,
+            points: settings.points(),
+            coverage: None,
+            outlines: None,
+            notes: false,
+            counts: None,
+        }
+    }
+}
+
+impl Job<'_> {
+    /// Samples that a task brings, outlines counted as others.
+    pub fn samples_of(&self, task: &Task) -> u64 {
+        let Range { start, end } = task.samples;
+        let of = |(x, y)| u64::from(self.counts.map_or(end, |c| end.min(c.of(x, y))).saturating_sub(start));
+        task.rect.pixels().map(of).sum()
     }
 }
 
@@ -103,6 +131,13 @@ impl<'a> Job<'a> {
 pub fn replicate_indices(range: &Range<u32>, r: u32, of: u32) -> Range<u32> {
     let first = |s: u32| if r < of { s.saturating_sub(r).div_ceil(of) } else { 0 };
     first(range.start)..first(range.end)
+}
+
+/// Those of the samples `range` that a pixel gets, by replicate.
+fn indices(range: &Range<u32>, [x, y]: [u32; 2], job: &Job, replicates: u32) -> [Range<u32>; REPLICATES] {
+    let end = job.counts.map_or(range.end, |c| range.end.min(c.of(x, y)));
+    let range = range.start..end.max(range.start);
+    std::array::from_fn(|replicate| replicate_indices(&range, replicate as u32, replicates))
 }
 
 /// Keys of camera rays.
@@ -140,39 +175,51 @@ impl Worker {
             results: PathResults::default(),
             work: Workspace::default(),
             bad: Vec::new(),
+            notes: Vec::new(),
+            spent: Spent::default(),
         }
     }
 
-    /// Renders the samples `range` of every pixel of a tile; the sums are then in `film` and `layers`.
+    /// Renders the samples `range` of every pixel of a tile, or as many of them as it gets; the sums are then in `film` and
+    /// `layers`.
     pub fn render_tile(&mut self, job: &Job, rect: PixelRect, range: Range<u32>) {
         self.film.reset(rect);
         self.layers.reset(rect);
         self.batch.spread = job.scene.camera.pixel_spread();
         self.batch.want_first = !job.settings.aovs.is_empty();
         self.batch.times = 1;
-        let replicates = job.settings.replicates();
-        let indices: [Range<u32>; REPLICATES] =
-            std::array::from_fn(|replicate| replicate_indices(&range, replicate as u32, replicates));
+        self.notes.clear();
+        self.notes.resize(if job.notes { rect.area() } else { 0 }, Note::default());
         let free = |x, y| job.coverage.is_some_and(|c| !c.is_covered(x, y));
-        let has_free = job.coverage.is_some() && rect.pixels().any(|(x, y)| free(x, y));
+        // Those that stand still get no further samples.
+        let has_free =
+            job.counts.is_none() && job.coverage.is_some() && rect.pixels().any(|(x, y)| free(x, y));
         if has_free {
             self.backdrop.fill(job.scene, job.settings.filter, rect);
         }
+        let replicates = job.settings.replicates();
         let is_outline = |x, y| job.outlines.is_some_and(|o| o.pixels.contains(x, y));
-        for (x, y) in rect.pixels() {
-            if is_outline(x, y) || has_free && free(x, y) && self.spare(x, y, &indices) {
-                continue;
+        let start = self.work.counts;
+        // Where samples are dealt by need, what needs none stands for as many as all have on average.
+        let standing = if job.notes { 0..job.settings.spp } else { range.clone() };
+        let standing = indices(&standing, [rect.x0, rect.y0], job, replicates);
+        for (x, y) in rect.pixels().filter(|&(x, y)| !is_outline(x, y)) {
+            if !(has_free && free(x, y) && self.spare(x, y, &standing)) {
+                self.add_pixel(job, &job.points, [x, y], &indices(&range, [x, y], job, replicates));
             }
-            self.add_pixel(job, &job.points, [x, y], &indices);
         }
         self.flush(job);
-        let Some(Outlined { pixels, points }) = job.outlines else { return };
-        self.batch.times = pixels.times();
-        let indices = indices.map(|i| i.start * pixels.times()..i.end.saturating_mul(pixels.times()));
-        for (x, y) in rect.pixels().filter(|&(x, y)| pixels.contains(x, y)) {
-            self.add_pixel(job, &points, [x, y], &indices);
+        let middle = self.work.counts;
+        if let Some(Outlined { pixels, points }) = job.outlines {
+            self.batch.times = pixels.times();
+            for (x, y) in rect.pixels().filter(|&(x, y)| pixels.contains(x, y)) {
+                let indices = indices(&range, [x, y], job, replicates)
+                    .map(|i| i.start * pixels.times()..i.end.saturating_mul(pixels.times()));
+                self.add_pixel(job, &points, [x, y], &indices);
+            }
+            self.flush(job);
         }
-        self.flush(job);
+        self.spent = Spent { plain: middle.since(&start), outlines: self.work.counts.since(&middle) };
     }
 
     /// Samples of one pixel, traced whenever a batch is full.
@@ -208,10 +255,18 @@ impl Worker {
             }
             self.spared += indices.len() as u64;
         }
+        self.note(x, y, || Note::bare(radiance));
         true
     }
 
-    /// Notes a run: whose samples they are, and at which pixel.
+    /// Notes what a pixel showed, if that is asked for.
+    fn note(&mut self, x: u32, y: u32, note: impl FnOnce() -> Note) {
+        if !self.notes.is_empty() {
+            self.notes[self.film.rect().index(x, y)] = note();
+        }
+    }
+
+    /// Adds a run to what is to be traced: whose samples they are, and at which pixel.
     fn add_run(&mut self, points: &PointSet, run: Run) {
         let end = run.start + run.len;
         let sampler = points.pixel(run.x, run.y, run.replicate);
@@ -269,6 +324,10 @@ impl Worker {
         let range = run.start..run.start + run.len;
         let (li, alpha) = (&self.results.li[range.clone()], &self.results.alpha[range.clone()]);
         let bad = self.film.add_run(run.x, run.y, run.replicate as usize, li, alpha);
+        if run.first_index == 0 && !self.notes.is_empty() {
+            let kind = if self.batch.times > 1 { Kind::Outline } else { Kind::Plain };
+            self.notes[self.film.rect().index(run.x, run.y)] = Note::of(li, alpha, kind);
+        }
         if bad > 0 {
             self.report_bad(run);
         }

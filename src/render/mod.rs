@@ -5,6 +5,7 @@ pub mod aov;
 pub mod backdrop;
 pub mod block;
 pub mod coverage;
+pub mod dealing;
 pub mod film;
 pub mod film_layers;
 pub mod fixed;
@@ -12,6 +13,7 @@ pub mod layers;
 pub mod outlines;
 pub mod settings;
 
+use crate::base::pixel_rect::PixelRect;
 use crate::error::{Error, Result};
 use crate::integrators::{Avoided, Integrator, PilotPlan, RayCounts, Specialised};
 use crate::memory;
@@ -19,12 +21,14 @@ use crate::scene::Scene;
 use adaptive::{Reached, Schedule, Task};
 use block::{BadSample, Job, Outlined, Worker};
 use coverage::Coverage;
+use dealing::Notes;
 use film::Film;
 use layers::Layers;
 use outlines::Outlines;
 use rayon::prelude::*;
 use serde::Serialize;
 use settings::RenderSettings;
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
@@ -141,6 +145,7 @@ impl Renderer {
         let crop = s.crop;
         let bytes_per_pixel =
             film::BYTES_PER_PIXEL + outlines::BYTES_PER_PIXEL + s.aovs.len() as u64 * layers::BYTES_PER_PIXEL;
+        let bytes_per_pixel = bytes_per_pixel + if s.deals() { dealing::BYTES_PER_PIXEL } else { 0 };
         let what = || format!("a film of {} x {}", crop.width(), crop.height());
         // Held to the end: what is written is made only then.
         let _room = memory::room(crop.area() as u64 * bytes_per_pixel, what)?;
@@ -161,6 +166,7 @@ impl Renderer {
             kind: s.sampler,
             is_outline: &is_outline,
             outline_times: outlines.as_ref().map_or(1, Outlines::times),
+            by_need: s.deals(),
         };
         let adapted = if s.pilot { self.integrator.specialise(scene, &plan) } else { None };
         let integrator = match adapted {
@@ -181,30 +187,12 @@ impl Renderer {
             ..Job::new(scene, integrator.as_ref(), s)
         };
         let workers = Mutex::new(Vec::<Worker>::new());
-        let mut schedule = Schedule::new(s, &out.film, out.stats.free_pixels);
-        let in_time = |rounds: u32| s.time.is_none_or(|t| rounds == 0 || start.elapsed() < t);
-        while in_time(schedule.rounds) && !out.stats.interrupted {
-            let tasks = schedule.next(&out.film);
-            if let (Some(reached), Some(target)) = (&schedule.reached, &s.target) {
-                progress.reached(reached, target.error);
-            }
-            if tasks.is_empty() {
-                break;
-            }
-            let rays = render_round(&job, &tasks, &workers, &mut out, progress)?;
-            for (task, rays) in tasks.iter().zip(rays) {
-                match rays {
-                    Some(rays) => schedule.done(task, rays),
-                    None => out.stats.interrupted = true,
-                }
-            }
+        if s.deals() {
+            dealt(&job, &workers, &mut out, progress)?;
+        } else {
+            rounds(&job, &workers, &mut out, start, progress)?;
         }
-        schedule.look(&out.film);
         let stats = &mut out.stats;
-        [stats.spp_least, stats.spp] = schedule.spp_range();
-        stats.spp_mean = schedule.spp_mean();
-        stats.rounds = schedule.rounds;
-        stats.reached = schedule.reached;
         stats.seconds = start.elapsed().as_secs_f64();
         for w in lock(&workers).drain(..) {
             stats.rays.add(&w.work.counts);
@@ -225,16 +213,81 @@ impl Renderer {
     }
 }
 
+/// Samples round by round, as many rounds as targets and clocks ask for.
+fn rounds(
+    job: &Job,
+    workers: &Mutex<Vec<Worker>>,
+    out: &mut Rendered,
+    start: Instant,
+    progress: &dyn Progress,
+) -> Result<()> {
+    let s = job.settings;
+    let mut schedule = Schedule::new(s, &out.film, out.stats.free_pixels);
+    let in_time = |rounds: u32| s.time.is_none_or(|t| rounds == 0 || start.elapsed() < t);
+    while in_time(schedule.rounds) && !out.stats.interrupted {
+        let tasks = schedule.next(&out.film);
+        if let (Some(reached), Some(target)) = (&schedule.reached, &s.target) {
+            progress.reached(reached, target.error);
+        }
+        if tasks.is_empty() {
+            break;
+        }
+        let rays = render_round(job, &tasks, workers, out, None, progress)?;
+        for (task, rays) in tasks.iter().zip(rays) {
+            match rays {
+                Some(rays) => schedule.done(task, rays),
+                None => out.stats.interrupted = true,
+            }
+        }
+    }
+    schedule.look(&out.film);
+    let stats = &mut out.stats;
+    [stats.spp_least, stats.spp] = schedule.spp_range();
+    stats.spp_mean = schedule.spp_mean();
+    stats.rounds = schedule.rounds;
+    stats.reached = schedule.reached;
+    Ok(())
+}
+
+/// Samples in two parts: some for every pixel, and the others where the first show that they are needed.
+fn dealt(job: &Job, workers: &Mutex<Vec<Worker>>, out: &mut Rendered, progress: &dyn Progress) -> Result<()> {
+    let spp = job.settings.spp;
+    let first = dealing::first_samples(spp);
+    let tiles: Vec<PixelRect> = out.film.tiles().collect();
+    let tasks = |samples: Range<u32>| -> Vec<Task> {
+        let task = |(tile, &rect)| Task { tile, rect, samples: samples.clone() };
+        tiles.iter().enumerate().map(task).collect()
+    };
+    let mut notes = Notes::new(out.film.window());
+    let noting = Job { notes: true, ..*job };
+    let done = render_round(&noting, &tasks(0..first), workers, out, Some(&mut notes), progress)?;
+    out.stats.rounds = 1;
+    out.stats.interrupted = done.contains(&None);
+    (out.stats.spp_least, out.stats.spp_mean, out.stats.spp) = (first, f64::from(first), first);
+    if out.stats.interrupted {
+        return Ok(());
+    }
+    let counts = notes.deal(first, spp, job.outlines.map(|o| o.pixels));
+    drop(notes);
+    (out.stats.spp_least, out.stats.spp_mean, out.stats.spp) = counts.range();
+    let rest = Job { counts: Some(&counts), ..*job };
+    let done = render_round(&rest, &tasks(first..out.stats.spp), workers, out, None, progress)?;
+    out.stats.rounds = 2;
+    out.stats.interrupted = done.contains(&None);
+    Ok(())
+}
+
 /// One round; the rays that each task took, `None` for those that were stopped before they began.
 fn render_round(
     job: &Job,
     tasks: &[Task],
     workers: &Mutex<Vec<Worker>>,
     out: &mut Rendered,
+    notes: Option<&mut Notes>,
     progress: &dyn Progress,
 ) -> Result<Vec<Option<u64>>> {
     let stopped = AtomicBool::new(false);
-    let sums = Mutex::new((&mut out.film, &mut out.layers));
+    let sums = Mutex::new((&mut out.film, &mut out.layers, notes));
     let run = |task: &Task| {
         if stopped.load(Ordering::Relaxed) || progress.should_stop() {
             stopped.store(true, Ordering::Relaxed);
@@ -249,9 +302,12 @@ fn render_round(
         let mut sums = lock(&sums);
         sums.0.add_tile(&worker.film);
         sums.1.merge(&worker.layers);
+        if let Some(notes) = &mut sums.2 {
+            notes.add_tile(&task.rect, &worker.notes, &worker.spent);
+        }
         drop(sums);
         lock(workers).push(worker);
-        progress.advance(task.rect.area() as u64 * u64::from(task.samples.end - task.samples.start));
+        progress.advance(job.samples_of(task));
         Ok(Some(rays))
     };
     tasks.par_iter().with_max_len(1).map(run).collect()

@@ -4,6 +4,7 @@ use crate::base::pixel_rect::PixelRect;
 use crate::error::{Error, Result};
 use crate::render::adaptive::Target;
 use crate::render::aov::AovRow;
+use crate::render::dealing::LEAST_SPP;
 use crate::render::film::REPLICATES;
 use crate::sampler::{PointSet, Sampler};
 use crate::sampling::filter::PixelFilter;
@@ -43,6 +44,9 @@ pub struct RenderSettings {
     /// How many samples, at most, pixels that outlines run through take for each of another; 1 if no more. See
     /// [`super::outlines`].
     pub outlines: u32,
+    /// Whether pixels get samples by what they need, for the same cost in all, or all as many; see [`super::dealing`]. Takes
+    /// [`super::dealing::LEAST_SPP`] samples, and does not go with `moments`, `target` or `time`, which deal by rounds.
+    pub by_need: bool,
     /// Whether the film shall know how large its error is: each pixel's samples are then two independent randomisations,
     /// which are less even together than one. Targets and time limits ask for that by themselves.
     pub moments: bool,
@@ -86,6 +90,7 @@ impl RenderSettings {
             filter: PixelFilter::default(),
             skip_background: true,
             outlines: OUTLINES,
+            by_need: true,
             moments: false,
             pilot: true,
             threads: std::thread::available_parallelism().map_or(1, |n| n.get()),
@@ -125,7 +130,13 @@ impl RenderSettings {
 
     fn points_of(&self, seed: u64, times: u32) -> PointSet {
         let count = self.spp.saturating_mul(times).div_ceil(self.replicates());
-        self.sampler.points(seed, (!self.has_rounds()).then_some(count))
+        let decides = self.has_rounds() || self.deals();
+        self.sampler.points(seed, (!decides).then_some(count))
+    }
+
+    /// Whether samples are dealt by need.
+    pub fn deals(&self) -> bool {
+        self.by_need && self.spp >= LEAST_SPP && !self.moments && !self.has_rounds()
     }
 
     /// Whether what was sampled decides how many samples pixels get.

@@ -59,7 +59,7 @@ impl Bench {
     /// Luminances of a render.
     fn picture(&self, sampler: Sampler, spp: u32, moments: bool, seed: u64) -> Vec<f64> {
         let usual = RenderSettings::new([SIDE, SIDE]);
-        let settings = RenderSettings { sampler, spp, moments, seed, threads: 2, ..usual };
+        let settings = RenderSettings { sampler, spp, moments, seed, threads: 2, by_need: false, ..usual };
         let renderer = Renderer { integrator: self.integrator.clone(), settings };
         let film = renderer.render(&self.scene, &Silent).unwrap().film;
         film.window().pixels().map(|(x, y)| f64::from(film.mean(x, y).luminance())).collect()

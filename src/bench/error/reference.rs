@@ -89,6 +89,7 @@ impl Reference {
         // What is on trial does not stand as judge.
         settings.skip_background = false;
         settings.outlines = 1;
+        settings.by_need = false;
         settings.moments = true;
         let renderer = Renderer { integrator: renderer.integrator.clone(), settings };
         let film = renderer.render(scene, progress)?.film;

@@ -59,6 +59,10 @@ pub static KEYS: &[Key] = &[
         s.settings.outlines = v.parse().map_err(number)?;
         s.settings.check()
     }),
+    Key::new("dealing", "samples by need, or as many for each pixel", |s, v| {
+        s.settings.by_need = choose("dealing", v, &[("by-need", true), ("even", false)])?;
+        Ok(())
+    }),
     Key::new("moments", "whether a render knows its own error", |s, v| {
         s.settings.moments = choose("moments", v, &[("true", true), ("false", false)])?;
         Ok(())

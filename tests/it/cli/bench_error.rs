@@ -62,7 +62,8 @@ fn what_cannot_be_measured_is_refused() {
 fn pixels_of_sky_alone_are_skipped_and_counted() {
     let f = Folder::new();
     let render = |flags: &str| {
-        let command = format!("render scene.toml --size 64x48 --spp 64 -o a.exr --stats s.json {flags}");
+        let command =
+            format!("render scene.toml --size 64x48 --spp 64 --dealing even -o a.exr --stats s.json {flags}");
         f.run(&command).succeeds();
         f.json("s.json")
     };

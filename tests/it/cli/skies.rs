@@ -71,7 +71,7 @@ fn skies_of_any_texels_are_rendered_by_every_way() {
 fn nothing_but_sky_traces_hardly_a_ray() {
     let f = Folder::new();
     f.write("s.toml", scene("type = \"midday\"", ""));
-    let (_, sky) = render(&f, "--stats s.json");
+    let (_, sky) = render(&f, "--dealing even --stats s.json");
     let stats = f.json("s.json");
     let count = |a: &str, b: &str| stats[a][b].as_u64().unwrap();
     // Pixels of more than three degrees: some of them, at the horizon, are sampled.

@@ -1,0 +1,297 @@
+//! Where the samples of a fixed budget go: a first part is dealt evenly, and what it shows decides how many more each pixel
+//! gets, so that the picture's relative error is least for what `spp` samples of every pixel would cost (Neyman 1934: as the
+//! root of variance over cost).
+//!
+//! A pixel's own samples must have no say in their number, or those that happen to agree end too soon (Kirk and Arvo 1991).
+//! So the film is coloured like a chessboard: what white pixels need is read off the black ones around them, and what black
+//! ones need off the white. Points of different pixels are independent where samples are dealt by need, hence numbers and
+//! samples of a pixel are, and its mean is unbiased (but for what the two mean costs of a sample, which are counted over the
+//! whole film, know of one pixel). Totals are powers of two, of one sequence of points from the first sample to the last.
+
+use super::outlines::Outlines;
+use crate::base::pixel_rect::PixelRect;
+use crate::color::Rgb;
+use crate::integrators::{BARE_COST, RayCounts};
+use rayon::prelude::*;
+
+/// Samples a pixel below which all get the same: a quarter of fewer says nothing.
+pub const LEAST_SPP: u32 = 4;
+/// Part of all samples that every pixel gets first: one in so many. Of four, what no neighbour foretells is too dear.
+const FIRST: u32 = 2;
+/// Most samples of a pixel for one of the mean, as a power of two.
+const MOST_LOG2: u32 = 4;
+/// Part of the squared mean that is added to a pixel's own, as in relMSE: what a dark pixel counts for.
+const EPSILON: f64 = 0.01;
+/// How far a pixel looks for others of its kind, in each direction.
+const REACH: u32 = 2;
+/// What those count that do not share an edge with it: little, where one does. Need changes from pixel to pixel.
+const FAR: f64 = 1.0 / 32.0;
+/// Samples go as what they are worth to this power. Where squared errors fall as n^-a the best is 1 / (1 + a), the root for
+/// independent samples; less where worth is a guess and numbers are powers of two.
+const POWER: f64 = 0.4;
+/// Steps of a histogram for each doubling of the number of samples.
+const STEPS: f64 = 64.0;
+/// Doublings that the histogram covers, half of them below one sample.
+const DOUBLINGS: f64 = 128.0;
+
+/// Bytes for each pixel of the film: what it showed, and its number.
+pub const BYTES_PER_PIXEL: u64 = (size_of::<Note>() + 2 * size_of::<u32>()) as u64;
+
+/// The samples that every pixel gets first, a power of two.
+pub fn first_samples(spp: u32) -> u32 {
+    1 << (spp / FIRST).max(1).ilog2()
+}
+
+/// What kind of pixel; neighbours of other kinds say little of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Kind {
+    /// Not sampled: bare sky that was integrated.
+    #[default]
+    Bare,
+    /// As most.
+    Plain,
+    /// An outline runs through.
+    Outline,
+}
+
+/// What the first samples of a pixel showed.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Note {
+    /// Mean luminance.
+    mean: f32,
+    /// Variance of a sample, such that the mean of n has one n-th of it.
+    variance: f32,
+    /// Part that met a surface.
+    alpha: f32,
+    kind: Kind,
+}
+
+impl Note {
+    /// Of a pixel that needs no samples.
+    pub fn bare(radiance: Rgb) -> Self {
+        Note { mean: radiance.luminance(), ..Note::default() }
+    }
+
+    /// Of consecutive samples, a power of two of them from the first on. Points are stratified, so that the spread of single
+    /// samples says too much: it is that of the means of groups, each of about the root of their number.
+    pub fn of(li: &[Rgb], alpha: &[f32], kind: Kind) -> Self {
+        let n = li.len().max(1);
+        let group = 1usize << (n.ilog2() / 2);
+        let luminance = |c: &Rgb| if c.is_finite() { f64::from(c.luminance()) } else { 0.0 };
+        let means = li.chunks(group).map(|g| g.iter().map(luminance).sum::<f64>() / g.len() as f64);
+        let (mut sum, mut squares, mut groups) = (0.0, 0.0, 0.0);
+        for m in means {
+            (sum, squares, groups) = (sum + m, squares + m * m, groups + 1.0);
+        }
+        let mean = sum / f64::max(groups, 1.0);
+        let spread = (squares - sum * mean).max(0.0) / f64::max(groups - 1.0, 1.0);
+        Note {
+            mean: mean as f32,
+            variance: (spread * group as f64) as f32,
+            alpha: alpha.iter().sum::<f32>() / n as f32,
+            kind,
+        }
+    }
+}
+
+/// What was spent on pixels of one kind in the first part.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Spent {
+    /// Rays of plain pixels.
+    pub plain: RayCounts,
+    /// Rays of outlines.
+    pub outlines: RayCounts,
+}
+
+impl Spent {
+    /// Adds another.
+    pub fn add(&mut self, o: &Spent) {
+        self.plain.add(&o.plain);
+        self.outlines.add(&o.outlines);
+    }
+}
+
+/// What the first part showed, by pixel.
+pub struct Notes {
+    rect: PixelRect,
+    list: Vec<Note>,
+    /// What it took.
+    pub spent: Spent,
+}
+
+/// Samples that are traced by pixel, the first ones among them; for outlines, so many times what the film's outlines take.
+pub struct Counts {
+    rect: PixelRect,
+    list: Vec<u32>,
+    /// What pixels have where nothing is traced.
+    bare: u32,
+}
+
+impl Counts {
+    /// Of a pixel; 0 where nothing is traced.
+    #[inline]
+    pub fn of(&self, x: u32, y: u32) -> u32 {
+        self.list[self.rect.index(x, y)]
+    }
+
+    /// The fewest, the mean and the most.
+    pub fn range(&self) -> (u32, f64, u32) {
+        let all = || self.list.iter().map(|&n| if n == 0 { self.bare } else { n });
+        let mean = all().map(f64::from).sum::<f64>() / self.list.len().max(1) as f64;
+        (all().min().unwrap_or(0), mean, all().max().unwrap_or(0))
+    }
+}
+
+/// What the other colour's pixels around say of one.
+#[derive(Clone, Copy)]
+struct Guess {
+    /// The binary logarithm of how many samples it shall get, up to a constant.
+    share: f64,
+    /// What a sample costs.
+    cost: f64,
+    /// The fewest samples; 0 where none are needed.
+    least: u32,
+}
+
+impl Notes {
+    /// Of a film, still empty.
+    pub fn new(rect: PixelRect) -> Self {
+        Notes { rect, list: vec![Note::default(); rect.area()], spent: Spent::default() }
+    }
+
+    /// A tile's, row by row.
+    pub fn add_tile(&mut self, tile: &PixelRect, notes: &[Note], spent: &Spent) {
+        for ((x, y), note) in tile.pixels().zip(notes) {
+            self.list[self.rect.index(x, y)] = *note;
+        }
+        self.spent.add(spent);
+    }
+
+    /// How many samples each pixel gets in all, after `first` of each, for the cost of `spp` of each.
+    pub fn deal(&self, first: u32, spp: u32, outlines: Option<&Outlines>) -> Counts {
+        let times = outlines.map_or(1, Outlines::times);
+        let plain = self.cost(Kind::Plain, &self.spent.plain, 1);
+        let costs = [plain, self.cost(Kind::Outline, &self.spent.outlines, times)];
+        let means = [0, 1].map(|colour| self.mean_of(1 - colour));
+        let rows: Vec<u32> = (self.rect.y0..self.rect.y1).collect();
+        let columns = self.rect.x0..self.rect.x1;
+        let dealer = Dealer { first, spp, most: (spp.ilog2() + MOST_LOG2).min(u32::BITS - 1) };
+        let guess = |x, y| self.guess(x, y, means[colour(x, y)], costs, &dealer);
+        let guesses: Vec<Guess> = rows
+            .par_iter()
+            .flat_map_iter(|&y| columns.clone().map(move |x| (x, y)))
+            .map(|(x, y)| guess(x, y))
+            .collect();
+        let scales = [0, 1].map(|wanted| {
+            let of_colour = self.rect.pixels().zip(&guesses).filter(|(p, _)| colour(p.0, p.1) == wanted);
+            dealer.scale(of_colour.map(|(_, g)| g))
+        });
+        let count = |((x, y), g): ((u32, u32), &Guess)| dealer.count(g.share + scales[colour(x, y)], g.least);
+        Counts { rect: self.rect, list: self.rect.pixels().zip(&guesses).map(count).collect(), bare: spp }
+    }
+
+    /// What a sample costs that meets a surface.
+    fn cost(&self, kind: Kind, rays: &RayCounts, times: u32) -> f64 {
+        let hits: f64 = self.list.iter().filter(|n| n.kind == kind).map(|n| f64::from(n.alpha)).sum();
+        let pixels = self.list.iter().filter(|n| n.kind == kind).count() as f64;
+        let met = rays.camera as f64 * hits / pixels.max(1.0);
+        f64::from(times) * (rays.cost() - (rays.camera as f64 - met) * BARE_COST).max(1.0) / met.max(1.0)
+    }
+
+    /// Mean luminance of the pixels of a colour.
+    fn mean_of(&self, wanted: usize) -> f64 {
+        let of_colour = self.rect.pixels().zip(&self.list).filter(|(p, _)| colour(p.0, p.1) == wanted);
+        let (sum, n) = of_colour.fold((0.0, 0.0), |(s, n), (_, note)| (s + f64::from(note.mean), n + 1.0));
+        sum / f64::max(n, 1.0)
+    }
+
+    /// From the pixels of the other colour and the same kind that are near, or of any kind where there is none.
+    fn guess(&self, x: u32, y: u32, mean: f64, costs: [f64; 2], dealer: &Dealer) -> Guess {
+        let own = self.list[self.rect.index(x, y)].kind;
+        // What an outline hides, its neighbours do not show.
+        let (hit, least) = match own {
+            Kind::Bare => return Guess { share: 0.0, cost: 0.0, least: 0 },
+            Kind::Plain => (costs[0], dealer.first),
+            Kind::Outline => (costs[1], 1 << dealer.spp.ilog2()),
+        };
+        let [n, luminance, variance, alpha] = self.around(x, y, own);
+        let scale = (luminance / n).powi(2) + EPSILON * mean * mean;
+        let error = if variance > 0.0 { variance / n / scale } else { 0.0 };
+        let cost = BARE_COST + if n > 0.0 { alpha / n } else { 1.0 } * hit;
+        Guess { share: POWER * (error / cost).log2(), cost, least }
+    }
+
+    /// Sums over the neighbours that speak for a pixel of a kind: of their weights, and weighted of their means, variances,
+    /// and parts that meet a surface.
+    fn around(&self, x: u32, y: u32, kind: Kind) -> [f64; 4] {
+        let near =
+            PixelRect::new(x.saturating_sub(REACH), y.saturating_sub(REACH), x + REACH + 1, y + REACH + 1);
+        let [mut same, mut any] = [[0.0f64; 4]; 2];
+        for (i, j) in near.intersection(&self.rect).pixels().filter(|p| colour(p.0, p.1) != colour(x, y)) {
+            let note = &self.list[self.rect.index(i, j)];
+            let weight = if x.abs_diff(i) + y.abs_diff(j) == 1 { 1.0 } else { FAR };
+            let values = [1.0, note.mean, note.variance, note.alpha].map(|v| weight * f64::from(v));
+            let sums = match note.kind {
+                Kind::Bare => continue,
+                k if k == kind => &mut same,
+                _ => &mut any,
+            };
+            sums.iter_mut().zip(values).for_each(|(sum, v)| *sum += v);
+        }
+        if same[0] > 0.0 { same } else { any }
+    }
+}
+
+/// White or black.
+fn colour(x: u32, y: u32) -> usize {
+    ((x ^ y) & 1) as usize
+}
+
+/// How numbers come from shares.
+struct Dealer {
+    first: u32,
+    /// Whose cost may be spent.
+    spp: u32,
+    /// The binary logarithm of the most.
+    most: u32,
+}
+
+impl Dealer {
+    /// The power of two that is nearest, where any are needed.
+    fn count(&self, share: f64, least: u32) -> u32 {
+        if least == 0 {
+            return 0;
+        }
+        (1u32 << share.round().clamp(0.0, f64::from(self.most)) as u32).max(least)
+    }
+
+    /// What is to be added to shares so that samples cost what `spp` of each would, or hardly less.
+    fn scale<'a>(&self, guesses: impl Iterator<Item = &'a Guess>) -> f64 {
+        // Costs by share, for either of two floors.
+        let mut histogram = vec![[0.0; 2]; (DOUBLINGS * STEPS) as usize];
+        let (mut budget, last) = (0.0, histogram.len() as f64 - 1.0);
+        for g in guesses.filter(|g| g.least > 0) {
+            budget += g.cost * f64::from(self.spp);
+            let at = ((g.share + 0.5 * DOUBLINGS) * STEPS).clamp(0.0, last) as usize;
+            histogram[at][usize::from(g.least > self.first)] += g.cost;
+        }
+        let floors = [self.first, 1 << self.spp.ilog2()];
+        let spent = |scale: f64| {
+            let bins = histogram.iter().enumerate().filter(|b| b.1[0] + b.1[1] > 0.0);
+            let of_bin = |(at, costs): (usize, &[f64; 2])| {
+                let share = (at as f64 + 0.5) / STEPS - 0.5 * DOUBLINGS + scale;
+                (0..2).map(|i| costs[i] * f64::from(self.count(share, floors[i]))).sum::<f64>()
+            };
+            bins.map(of_bin).sum::<f64>()
+        };
+        let (mut low, mut high) = (-DOUBLINGS, DOUBLINGS);
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            if spent(middle) > budget { high = middle } else { low = middle }
+        }
+        low
+    }
+}
+
+#[cfg(test)]
+mod tests;

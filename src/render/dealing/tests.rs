@@ -1,0 +1,118 @@
+use super::*;
+use crate::testing::TestRng;
+
+const RECT: PixelRect = PixelRect::new(7, 4, 71, 52);
+
+/// Notes of surfaces all over, which a rule makes.
+fn notes(mut note: impl FnMut(u32, u32) -> Note) -> Notes {
+    let mut notes = Notes::new(RECT);
+    notes.list = RECT.pixels().map(|(x, y)| note(x, y)).collect();
+    let pixels = RECT.area() as u64;
+    notes.spent.plain = RayCounts { camera: 8 * pixels, scattered: 0, shadow: 16 * pixels };
+    notes
+}
+
+fn plain(mean: f32, variance: f32) -> Note {
+    Note { mean, variance, alpha: 1.0, kind: Kind::Plain }
+}
+
+fn random(seed: u64) -> Notes {
+    let mut rng = TestRng::new(seed);
+    notes(|_, _| Note {
+        kind: [Kind::Plain, Kind::Plain, Kind::Outline, Kind::Bare][(rng.bits() % 4) as usize],
+        ..plain(rng.f32(), rng.f32().powi(8))
+    })
+}
+
+#[test]
+fn a_pixel_has_no_say_in_its_own_number() {
+    let usual = random(1);
+    let before = usual.deal(8, 16, None);
+    let mut changed = 0;
+    for (at, (x, y)) in RECT.pixels().enumerate().step_by(37) {
+        let mut other = Notes { rect: RECT, list: usual.list.clone(), spent: usual.spent };
+        other.list[at].mean = 1e3;
+        other.list[at].variance = 1e7;
+        let after = other.deal(8, 16, None);
+        assert_eq!(after.of(x, y), before.of(x, y), "{x} {y}");
+        changed += RECT.pixels().filter(|&(i, j)| after.of(i, j) != before.of(i, j)).count();
+    }
+    assert!(changed > 100, "others go by it: {changed}");
+}
+
+#[test]
+fn all_cost_what_was_asked_for() {
+    let alike = |spp: u32, variance: &dyn Fn(&mut TestRng) -> f32| {
+        let mut rng = TestRng::new(u64::from(spp));
+        let counts = notes(|_, _| plain(1.0, variance(&mut rng))).deal(first_samples(spp), spp, None);
+        counts.range()
+    };
+    for spp in [4, 5, 8, 16, 100, 1024] {
+        // Where pixels want their shares of what is left, numbers are powers of two, as the sum comes out. By far the most
+        // pixels differ in their worth, so that a step of the scale moves few of them.
+        let (least, mean, most) = alike(spp, &|rng| rng.f32().powi(6));
+        // A thousandth more is the width of the histogram's bins.
+        assert!(mean <= 1.001 * f64::from(spp) && mean > 0.95 * f64::from(spp), "{spp}: {mean}");
+        assert!(least == first_samples(spp) && most > spp && most <= 16 * spp, "{least} {most}");
+        // No noise at all: nothing is to be gained.
+        assert_eq!(
+            alike(spp, &|_| 0.0),
+            (first_samples(spp), f64::from(first_samples(spp)), first_samples(spp))
+        );
+    }
+}
+
+#[test]
+fn numbers_go_by_noise_and_cost() {
+    // The right half has 32 times the variance, to the power 0.4 that is 4. Away from the border that is seen alone.
+    let counts = notes(|x, _| plain(1.0, if x < 40 { 1.0 } else { 32.0 })).deal(8, 32, None);
+    assert_eq!(
+        [counts.of(20, 20), counts.of(60, 20)]
+            .map(f64::from)
+            .map(f64::log2)
+            .map(|l| l - f64::from(counts.of(20, 20)).log2()),
+        [0.0, 2.0]
+    );
+    // The same noise of a pixel three times as dark is nine times as bad: 9^0.4 is 2.4.
+    let counts = notes(|x, _| plain(if x < 40 { 3.0 } else { 1.0 }, 1.0)).deal(8, 32, None);
+    assert_eq!(counts.of(60, 20), 2 * counts.of(20, 20));
+    // Samples that mostly meet nothing are cheap.
+    let half = |x: u32| if x < 40 { 1.0 } else { 0.01 };
+    let counts = notes(|x, _| Note { alpha: half(x), ..plain(1.0, 1.0) }).deal(8, 32, None);
+    assert!(counts.of(60, 20) >= 4 * counts.of(20, 20), "{} {}", counts.of(60, 20), counts.of(20, 20));
+}
+
+#[test]
+fn what_stands_gets_no_more_and_outlines_no_less() {
+    let usual = random(2);
+    let counts = usual.deal(8, 16, None);
+    for ((x, y), note) in RECT.pixels().zip(&usual.list) {
+        let n = counts.of(x, y);
+        match note.kind {
+            Kind::Bare => assert_eq!(n, 0),
+            Kind::Plain => assert!(n.is_power_of_two() && (8..=256).contains(&n)),
+            Kind::Outline => assert!(n.is_power_of_two() && (16..=256).contains(&n)),
+        }
+    }
+}
+
+#[test]
+fn a_note_tells_the_spread_of_what_stratification_leaves() {
+    let gray = |values: &[f32]| values.iter().map(|v| Rgb::new(*v, *v, *v)).collect::<Vec<_>>();
+    let of = |values: &[f32]| Note::of(&gray(values), &vec![1.0; values.len()], Kind::Plain);
+    let same = of(&[0.5; 8]);
+    assert_eq!((same.mean, same.variance, same.alpha), (0.5, 0.0, 1.0));
+    // Two by two they are alike: nothing is left. One by one of two: all is.
+    assert_eq!(of(&[0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0, 0.0]).variance, 0.0);
+    assert!((of(&[0.0, 1.0]).variance - 0.5).abs() < 1e-6);
+    // Independent samples: that of one, whatever the groups. 2,000 notes of 16 with 3 degrees of freedom each have 2 % of it.
+    let mut rng = TestRng::new(3);
+    let mean = (0..2000)
+        .map(|_| f64::from(of(&std::array::from_fn::<f32, 16, _>(|_| rng.f32())).variance))
+        .sum::<f64>()
+        / 2000.0;
+    assert!((mean * 12.0 - 1.0).abs() < 0.08, "{mean}");
+    assert_eq!(of(&[f32::NAN, 1.0]).mean, 0.5, "what is no number is left black, as in the film");
+    assert_eq!(first_samples(4), 2);
+    assert_eq!(first_samples(100), 32);
+}
