@@ -24,5 +24,6 @@ mod product;
 mod reference;
 mod seeds;
 mod source;
+mod unbiased;
 mod unneeded;
 mod vertices;

@@ -8,7 +8,8 @@ use std::sync::Arc;
 /// Standard errors: over the 94 comparisons below a false alarm in 1,500 runs.
 const SIGMAS: f64 = 4.5;
 
-fn ground_and(sky: &str, sampling: &str, material: &str, more: &str) -> String {
+/// A ball of a material on a square of clay, and sky above and beside it.
+pub fn ground_and(sky: &str, sampling: &str, material: &str, more: &str) -> String {
     format!(
         r#"
 [film]
@@ -37,9 +38,9 @@ material = "clay"
     )
 }
 
-const LAMP: &str = "[materials.lamp]\ntype = \"emissive\"\nradiance = 3\n[[objects]]\nshape = { type = \"sphere\", \
+pub const LAMP: &str = "[materials.lamp]\ntype = \"emissive\"\nradiance = 3\n[[objects]]\nshape = { type = \"sphere\", \
                     center = [1.2, 1.5, 0.5], radius = 0.3 }\nmaterial = \"lamp\"\n";
-const SUN: &str = "[[lights]]\ntype = \"directional\"\ndirection = [-1, -1, -1]\nirradiance = 2\n";
+pub const SUN: &str = "[[lights]]\ntype = \"directional\"\ndirection = [-1, -1, -1]\nirradiance = 2\n";
 
 /// Ten scenes: skies flat and with suns, even, glossy, clear and rough surfaces, other lights beside the sky.
 fn scenes() -> Vec<(&'static str, &'static str, &'static str, bool)> {
