@@ -42,7 +42,9 @@ class Lux:
 
     def open(self, scene):
         self.size = scene.size
-        self.depth = scene.max_depth if scene.integrator == "path" else 1
+        # One more than ours: Lux takes no light at its last vertex, unless that is the first one, too, where it samples the
+        # sky alone, without a ray of the material's, so that half of its directions are under the horizon.
+        self.depth = 1 + (scene.max_depth if scene.integrator == "path" else 1)
         self.scene = self.lux.Scene()
         eye, at, up = (scene.camera[k] for k in ["eye", "look_at", "up"])
         table = {
@@ -85,6 +87,9 @@ class Lux:
             "scene.lights.sky.file": path,
             "scene.lights.sky.gamma": 1.0,
             "scene.lights.sky.storage": "float",
+            # Texels of one radiance, as the table of directions has them: between bilinear ones, a bright texel's rim is
+            # sampled by its dark neighbour's density, which makes fireflies (100 x the variance under stars).
+            "scene.lights.sky.filter": "nearest",
             "scene.lights.sky.visibilitymapcache.enable": False,
             # From x, z, y: a mirror, as Lux counts azimuths the other way round.
             "scene.lights.sky.transformation": [1, 0, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 1],

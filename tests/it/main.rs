@@ -9,6 +9,7 @@ mod common;
 mod convert;
 mod corpus;
 mod crosscheck;
+mod dealing;
 mod each_light;
 mod geometry;
 mod glass;

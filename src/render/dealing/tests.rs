@@ -51,8 +51,9 @@ fn all_cost_what_was_asked_for() {
         // Where pixels want their shares of what is left, numbers are powers of two, as the sum comes out. By far the most
         // pixels differ in their worth, so that a step of the scale moves few of them.
         let (least, mean, most) = alike(spp, &|rng| rng.f32().powi(6));
-        // A thousandth more is the width of the histogram's bins.
-        assert!(mean <= 1.001 * f64::from(spp) && mean > 0.95 * f64::from(spp), "{spp}: {mean}");
+        // Bins of the histogram are 1/64 of an octave, and not all pixels lie within one octave: half of a bin that is
+        // doubled by mistake is less than a hundredth of them.
+        assert!(mean <= 1.01 * f64::from(spp) && mean > 0.95 * f64::from(spp), "{spp}: {mean}");
         assert!(least == first_samples(spp) && most > spp && most <= 16 * spp, "{least} {most}");
         // No noise at all: nothing is to be gained.
         assert_eq!(

@@ -211,6 +211,7 @@ impl Plan {
                 sampler: Sampler::Independent,
                 skip_background: false,
                 outlines: 1,
+                by_need: false,
                 moments: false,
                 pilot: false,
                 threads: 1,
@@ -325,8 +326,9 @@ pub fn techniques() -> Vec<Technique> {
             |s| s.spared > 0,
             8,
         ),
+        seen(by("dealing by need", |p| p.settings.by_need = true), by_need, 10),
         seen(Technique { renders: 10, ..by("target", |p| p.set_target(p.targets[0])) }, by_need, 8),
-        by("all defaults", Plan::set_defaults),
+        seen(by("all defaults", Plan::set_defaults), by_need, 10),
         seen(
             Technique {
                 renders: 10,
