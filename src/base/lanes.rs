@@ -24,6 +24,14 @@ impl Columns<f32> {
     }
 }
 
+impl<T: Copy> Columns<T> {
+    /// Those in these lanes, in this order.
+    #[inline]
+    pub fn picked(&self, order: &[usize; LANES]) -> Self {
+        Columns(self.0.each_ref().map(|column| order.map(|lane| column[lane])))
+    }
+}
+
 impl Columns<f64> {
     /// The vector in a lane.
     #[inline(always)]

@@ -21,6 +21,11 @@ pub struct Receiver {
     pub ns: Vec3,
 }
 
+impl Receiver {
+    /// Stands where none is asked about.
+    pub const NOWHERE: Receiver = Receiver { p: Vec3::ZERO, ng: Vec3::ZERO, ns: Vec3::ZERO };
+}
+
 /// Light arriving along a sampled direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LightSample {

@@ -1,6 +1,7 @@
 //! How a surface scatters and emits, in the local frame of its shading normal (z).
 
 use crate::base::directions::{DirectionLanes, LANES};
+use crate::base::lanes::{Columns, LANES as MANY};
 use crate::base::shape::Needs;
 use crate::base::vertex::Vertex;
 use crate::color::Rgb;
@@ -82,6 +83,19 @@ pub struct BsdfLanes {
     pub pdf: [f32; LANES],
 }
 
+/// Samples for several points of one material, as columns.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct SampleLanes {
+    /// See [`BsdfSample::wi`].
+    pub wi: Columns<f32>,
+    /// See [`BsdfSample::weight`]; black where the path ends.
+    pub weight: Columns<f32>,
+    /// See [`BsdfSample::pdf`].
+    pub pdf: [f32; MANY],
+    /// See [`BsdfSample::delta`].
+    pub delta: [bool; MANY],
+}
+
 /// Scattering and emission. All directions are local (z is the shading normal), of unit length and away from the
 /// surface; `wo` may lie below (z < 0) when the surface is seen from behind.
 pub trait Material: Send + Sync {
@@ -92,6 +106,11 @@ pub trait Material: Send + Sync {
 
     /// Reads textures at the vertex into `out`, once.
     fn prepare(&self, vertex: &Vertex, out: &mut Prepared);
+
+    /// What [`Material::prepare`] makes of every vertex, if that is the same everywhere: then it is not asked.
+    fn prepared_everywhere(&self) -> Option<Prepared> {
+        None
+    }
 
     /// f |cos| and density for a pair of directions; zero for delta lobes.
     fn eval(&self, m: &Prepared, wo: Vec3, wi: Vec3) -> BsdfEval;
@@ -114,6 +133,27 @@ pub trait Material: Send + Sync {
 
     /// Samples `wi`. `uc` picks a lobe where there are several. None if the path ends here.
     fn sample(&self, m: &Prepared, wo: Vec3, u: [f32; 2], uc: f32) -> Option<BsdfSample>;
+
+    /// [`Material::sample`] of each of the first `n` viewers, bit for bit, by a column for each number; what other lanes hold
+    /// means nothing.
+    fn sample_many(
+        &self,
+        m: &Prepared,
+        wo: &Columns<f32>,
+        u: &[[f32; MANY]; 2],
+        uc: &[f32; MANY],
+        n: usize,
+    ) -> SampleLanes {
+        let mut out = SampleLanes::default();
+        for k in 0..n.min(MANY) {
+            if let Some(s) = self.sample(m, wo.get(k), [u[0][k], u[1][k]], uc[k]) {
+                out.wi.set(k, s.wi);
+                out.weight.set(k, s.weight.to_array().into());
+                (out.pdf[k], out.delta[k]) = (s.pdf, s.delta);
+            }
+        }
+        out
+    }
 
     /// Reflectance for light from everywhere, seen from `wo`: an estimate good to some percent, for AOVs and
     /// decisions, not for radiometry.

@@ -1,6 +1,7 @@
 //! Rays, one by one and in batches.
 
 use crate::base::directions::{DirectionLanes, Directions, LANES};
+use crate::base::lanes::{Columns, LANES as MANY};
 use glam::Vec3;
 
 /// A segment `o + t d`, `tnear <= t <= tfar`; `d` need not be of unit length.
@@ -134,6 +135,20 @@ impl RayBatch {
         append(&mut self.key, &[key; LANES], n);
     }
 
+    /// Appends rays without end, the first `n` of these lanes.
+    #[inline]
+    pub fn push_lanes(&mut self, o: &Columns<f32>, d: &Columns<f32>, keys: &[u32; MANY], n: usize) {
+        append(&mut self.ox, &o.0[0], n);
+        append(&mut self.oy, &o.0[1], n);
+        append(&mut self.oz, &o.0[2], n);
+        append(&mut self.dx, &d.0[0], n);
+        append(&mut self.dy, &d.0[1], n);
+        append(&mut self.dz, &d.0[2], n);
+        append(&mut self.tnear, &[0.0; MANY], n);
+        append(&mut self.tfar, &[f32::INFINITY; MANY], n);
+        append(&mut self.key, keys, n);
+    }
+
     /// Ray `i`.
     #[inline]
     pub fn get(&self, i: usize) -> Ray {
@@ -160,7 +175,7 @@ impl RayBatch {
 
 /// Appends the first `n`: all of them, which is one instruction or two, less those that are too many.
 #[inline(always)]
-fn append<T: Copy>(column: &mut Vec<T>, lanes: &[T; LANES], n: usize) {
+fn append<T: Copy, const N: usize>(column: &mut Vec<T>, lanes: &[T; N], n: usize) {
     let len = column.len() + n;
     column.extend_from_slice(lanes);
     column.truncate(len);

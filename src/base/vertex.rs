@@ -91,13 +91,7 @@ impl Vertex {
     /// of `p` (Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th ed., 6.8.6), never by a global epsilon.
     #[inline]
     pub fn spawn_origin(&self, w: Vec3) -> Vec3 {
-        let outward = w.dot(self.ng) >= 0.0;
-        let n = if outward { self.ng } else { -self.ng };
-        let distance = n.abs().dot(self.error);
-        let base = if outward { self.p + self.lift } else { self.p };
-        let o = base + n * distance;
-        // The sum was rounded, perhaps towards the surface: step once more, away from it.
-        Vec3::new(step(o.x, n.x), step(o.y, n.y), step(o.z, n.z))
+        start(w, self.ng, self.p, self.lift, self.error)
     }
 
     /// A ray that leaves in direction `w`, without end.
@@ -227,9 +221,23 @@ fn round_up(v: DVec3) -> Vec3 {
     v.as_vec3() * (1.0 + 2.0 * f32::EPSILON)
 }
 
+/// See [`Vertex::spawn_origin`]. Without a branch, for loops over many.
+#[inline(always)]
+pub(super) fn start(w: Vec3, ng: Vec3, p: Vec3, lift: Vec3, error: Vec3) -> Vec3 {
+    let outward = w.dot(ng) >= 0.0;
+    let pick = |a: f32, b: f32| if outward { a } else { b };
+    let n = Vec3::new(pick(ng.x, -ng.x), pick(ng.y, -ng.y), pick(ng.z, -ng.z));
+    let distance = n.abs().dot(error);
+    let lifted = p + lift;
+    let base = Vec3::new(pick(lifted.x, p.x), pick(lifted.y, p.y), pick(lifted.z, p.z));
+    let o = base + n * distance;
+    // The sum was rounded, perhaps towards the surface: step once more, away from it.
+    Vec3::new(step(o.x, n.x), step(o.y, n.y), step(o.z, n.z))
+}
+
 /// From `x` to a neighbour on the side of `n`, the next or the one after it. By arithmetic rather than by bits: nothing
 /// here could be predicted.
-#[inline]
+#[inline(always)]
 fn step(x: f32, n: f32) -> f32 {
     // |x| epsilon is one to two units in the last place; the smallest normal number steps off zero.
     let away = (x.abs() * f32::EPSILON + f32::MIN_POSITIVE).copysign(n);

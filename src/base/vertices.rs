@@ -5,7 +5,7 @@ use crate::base::hit::{Hit, HitBatch};
 use crate::base::lanes::{Columns, LANES, LocalRays, Surfaces};
 use crate::base::ray::RayBatch;
 use crate::base::shape::{Needs, Shape};
-use crate::base::vertex::{Body, Vertex, facing, frame_along, placed, texture_footprint};
+use crate::base::vertex::{Body, Vertex, facing, frame_along, placed, start, texture_footprint};
 use crate::math::frame::Frame;
 use crate::math::simd::{Kernel, dispatch};
 use glam::{Vec2, Vec3};
@@ -126,6 +126,23 @@ impl Vertices {
         self.rest[lane] = Rest { uv, footprint, path, prim, object, slot };
     }
 
+    /// The object and the slot of its material, if they are the same for the first `n`, at least one.
+    pub fn look(&self, n: usize) -> Option<(u32, u32)> {
+        let look = |rest: &Rest| (rest.object, rest.slot);
+        let first = look(&self.rest[0]);
+        self.rest[1..n].iter().all(|rest| look(rest) == first).then_some(first)
+    }
+
+    /// Local directions to the viewers.
+    pub fn local_viewers(&self, out: &mut Columns<f32>) {
+        dispatch(Viewers { points: &self.points, out });
+    }
+
+    /// Rays that leave in local directions.
+    pub fn leave(&self, local: &Columns<f32>, out: &mut Leaving) {
+        dispatch(Leave { points: &self.points, local, out });
+    }
+
     /// The point in a lane.
     #[inline(always)]
     pub fn get(&self, lane: usize) -> Vertex {
@@ -134,7 +151,7 @@ impl Vertices {
             p: points.p.get(lane),
             error: points.error.get(lane),
             ng: points.ng.get(lane),
-            frame: Frame { s: points.s.get(lane), t: points.t.get(lane), n: points.ns.get(lane) },
+            frame: points.frame(lane),
             wo: points.wo.get(lane),
             uv: rest.uv,
             footprint: rest.footprint,
@@ -148,7 +165,23 @@ impl Vertices {
     }
 }
 
+/// Rays that leave surface points.
+#[derive(Default)]
+pub struct Leaving {
+    /// See [`Vertex::spawn_origin`].
+    pub o: Columns<f32>,
+    /// Their directions.
+    pub d: Columns<f32>,
+    /// More than 0 if [`Vertex::is_consistent`].
+    pub consistent: [f32; LANES],
+}
+
 impl Points {
+    #[inline(always)]
+    fn frame(&self, lane: usize) -> Frame {
+        Frame { s: self.s.get(lane), t: self.t.get(lane), n: self.ns.get(lane) }
+    }
+
     #[inline(always)]
     fn set_frame(&mut self, lane: usize, f: &Frame) {
         self.s.set(lane, f.s);
@@ -246,5 +279,48 @@ fn body(s: &Surfaces, lane: usize) -> Body {
         ng: s.ng.get(lane),
         ns: s.ns.get(lane),
         lift: s.lift.get(lane),
+    }
+}
+
+struct Viewers<'a> {
+    points: &'a Points,
+    out: &'a mut Columns<f32>,
+}
+
+impl Kernel for Viewers<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Viewers { points, out } = self;
+        for l in 0..LANES {
+            out.set(l, points.frame(l).to_local(points.wo.get(l)));
+        }
+    }
+}
+
+struct Leave<'a> {
+    points: &'a Points,
+    local: &'a Columns<f32>,
+    out: &'a mut Leaving,
+}
+
+impl Kernel for Leave<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        leave(self.points, self.local, self.out);
+    }
+}
+
+#[inline(always)]
+fn leave(points: &Points, local: &Columns<f32>, out: &mut Leaving) {
+    for l in 0..LANES {
+        let (frame, ng) = (points.frame(l), points.ng.get(l));
+        let w = frame.to_world(local.get(l));
+        out.d.set(l, w);
+        out.consistent[l] = w.dot(ng) * w.dot(frame.n);
+        out.o.set(l, start(w, ng, points.p.get(l), points.lift.get(l), points.error.get(l)));
     }
 }

@@ -4,6 +4,7 @@
 pub mod ambient_occlusion;
 pub mod analytic;
 mod avoided;
+mod columns;
 mod depth;
 pub mod direct;
 mod escapes;
@@ -16,6 +17,7 @@ mod points;
 mod several;
 pub mod strategy;
 mod surface;
+mod together;
 pub mod whitted;
 
 pub use avoided::Avoided;

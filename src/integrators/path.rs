@@ -6,7 +6,7 @@ use super::escapes::Escapes;
 use super::pending::Pending;
 use super::points::VertexPoints;
 use super::strategy::{Strategies, Strategy};
-use super::surface::{LastLook, Surface};
+use super::together::Together;
 use super::{CameraBatch, FirstHit, Integrator, PathResults, PilotPlan, Specialised, Workspace, pilot};
 use crate::base::hit::{HitBatch, NO_PRIMITIVE};
 use crate::base::light::Receiver;
@@ -14,11 +14,9 @@ use crate::base::material::Prepared;
 use crate::base::ray::{Coherence, RayBatch};
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::base::vertex::Vertex;
-use crate::base::vertices::Vertices;
 use crate::color::Rgb;
 use crate::error::Result;
 use crate::scene::{Meetings, Scene};
-use glam::Vec3;
 use std::sync::Arc;
 
 /// The registry row.
@@ -129,7 +127,7 @@ pub(super) struct PathState {
     pub beta: Rgb,
     /// Density per solid angle of the direction travelled; infinite where no light sample competes.
     pub pdf: f32,
-    /// Where the ray left, for the density of light samples.
+    /// Where the ray left, for the density of light samples; nowhere if none competes.
     pub from: Receiver,
     /// Density with which light sampling found the direction on the guided light, if there is one; infinite where what it
     /// shows there counts nothing.
@@ -140,6 +138,21 @@ pub(super) struct PathState {
     pub index: u32,
 }
 
+impl PathState {
+    /// Of a camera ray: what it meets shows all that it has.
+    #[inline(always)]
+    fn from_camera(index: u32) -> Self {
+        PathState {
+            beta: Rgb::WHITE,
+            pdf: f32::INFINITY,
+            from: Receiver::NOWHERE,
+            guided_pdf: 0.0,
+            eta2: 1.0,
+            index,
+        }
+    }
+}
+
 /// Path states, kept from block to block.
 #[derive(Default)]
 pub struct PathScratch {
@@ -148,7 +161,7 @@ pub struct PathScratch {
     pub(super) pending: Vec<Pending>,
     pub(super) escapes: Escapes,
     /// Which rays of the depth met something.
-    hits: Vec<u32>,
+    pub(super) hits: Vec<u32>,
     pub(super) points: VertexPoints,
 }
 
@@ -250,29 +263,27 @@ impl PathTracer {
         paths.sort_out(&work.hits, rays);
         paths.escapes.add_background(scene, &mut out.li);
         paths.draw(&block, |_, i| i);
-        let mut some = Together::default();
+        let mut some = Together::new(block.goes_by_columns());
         loop {
             let met = Meetings { rays, hits: &work.hits, spread: batch.spread };
-            some.next(scene, &met, &paths.hits, |index, v| PathState {
-                beta: Rgb::WHITE,
-                pdf: f32::INFINITY,
-                from: Receiver { p: v.p, ng: Vec3::ZERO, ns: Vec3::ZERO },
-                guided_pdf: 0.0,
-                eta2: 1.0,
-                index,
-            });
-            let surfaces = &mut some.surfaces;
-            if surfaces.is_empty() {
-                break;
-            }
-            for s in surfaces.iter() {
+            let Some(found) = some.next(scene, &met, &paths.hits, PathState::from_camera) else { break };
+            for s in found.surfaces.iter() {
                 out.alpha[s.state.index as usize] = 1.0;
                 if batch.want_first {
                     out.first[s.state.index as usize] = Some(first_hit(scene, s.v));
                 }
                 block.add_emission(&s.state, &s.v, -s.v.wo, out);
             }
-            self.scatter(&block, surfaces, work, paths);
+            self.scatter(&block, found.surfaces, work, paths);
+            if let Some(like) = &found.alike {
+                for (lane, &i) in paths.hits[like.range()].iter().enumerate() {
+                    out.alpha[i as usize] = 1.0;
+                    if batch.want_first {
+                        out.first[i as usize] = Some(first_hit(scene, like.vertices.get(lane)));
+                    }
+                }
+                self.extend_many(&block, like, work, paths, |_, i| PathState::from_camera(i));
+            }
             block.resolve_many(work, paths, out);
         }
         block.resolve_shadows(work, paths, out);
@@ -296,59 +307,23 @@ impl PathTracer {
         if goes_on {
             paths.draw(block, |states, i| states[i as usize].index);
         }
-        let mut some = Together::default();
+        let mut some = Together::new(goes_on && block.goes_by_columns());
         loop {
             let met = Meetings { rays, hits: &work.hits, spread: 0.0 };
-            some.next(block.scene, &met, &paths.hits, |i, _| paths.states[i as usize]);
-            let surfaces = &mut some.surfaces;
-            if surfaces.is_empty() {
-                break;
-            }
-            for s in surfaces.iter() {
+            let state = |i: u32| paths.states[i as usize];
+            let Some(found) = some.next(block.scene, &met, &paths.hits, state) else { break };
+            for s in found.surfaces.iter() {
                 block.add_emission(&s.state, &s.v, -s.v.wo, out);
             }
             if goes_on {
-                self.scatter(block, surfaces, work, paths);
+                self.scatter(block, found.surfaces, work, paths);
+                if let Some(like) = &found.alike {
+                    self.extend_many(block, like, work, paths, |states, i| states[i as usize]);
+                }
                 block.resolve_many(work, paths, out);
             }
         }
         block.resolve_shadows(work, paths, out);
-    }
-}
-
-/// The surface points of a depth, a few at a time.
-#[derive(Default)]
-struct Together<'a> {
-    surfaces: Vec<Surface<'a>>,
-    vertices: Vertices,
-    look: LastLook<'a>,
-    /// Hits whose points have been here.
-    done: usize,
-}
-
-impl<'a> Together<'a> {
-    /// Goes on to the next of the hits, to none at their end. `state` tells the path of a ray.
-    #[inline]
-    fn next(
-        &mut self,
-        scene: &'a Scene,
-        met: &Meetings,
-        hits: &[u32],
-        state: impl Fn(u32, &Vertex) -> PathState,
-    ) {
-        self.surfaces.clear();
-        self.surfaces.reserve(Surface::AT_ONCE);
-        let end = hits.len().min(self.done + Surface::AT_ONCE);
-        while self.done < end {
-            let which = &hits[self.done..end];
-            let n = scene.vertices(met, which, &mut self.vertices);
-            // By an iterator of known length, each is made where it stays.
-            self.surfaces.extend(which[..n].iter().enumerate().map(|(lane, &i)| {
-                let v = self.vertices.get(lane);
-                Surface::new(scene, &mut self.look, v, state(i, &v), self.done + lane)
-            }));
-            self.done += n;
-        }
     }
 }
 

@@ -2,7 +2,8 @@
 //! would wait for itself.
 
 use super::{PathId, PathIds};
-use crate::sampler::{Dim, Slot, points_2d};
+use crate::base::lanes::LANES;
+use crate::sampler::{Dim, PixelSampler, Slot, points_2d};
 
 /// Points by surface point.
 #[derive(Default)]
@@ -25,6 +26,18 @@ pub struct VertexPoint {
     pub share: f32,
 }
 
+/// What a few surface points draw to go on, as columns.
+pub struct PointLanes<'a> {
+    /// See [`PathId::sampler`].
+    pub samplers: &'a [PixelSampler],
+    /// See [`PathId::index`].
+    pub indices: &'a [u32],
+    /// See [`PathId::key`].
+    pub keys: &'a [u32],
+    /// See [`Slot::BsdfUv`].
+    pub bsdf: [[f32; LANES]; 2],
+}
+
 impl VertexPoints {
     /// Draws for `paths` (indices into `ids`) at a depth.
     pub fn draw(&mut self, ids: &PathIds, paths: impl Iterator<Item = u32>, depth: u32, with_light: bool) {
@@ -38,6 +51,22 @@ impl VertexPoints {
         fill(&self.ids, Dim::at(depth, Slot::BsdfUv), &mut self.bsdf);
         if with_light {
             fill(&self.ids, Dim::at(depth, Slot::LightUv), &mut self.light);
+        }
+    }
+
+    /// Those of `n` paths, the `k`th on, for going on.
+    #[inline]
+    pub fn lanes(&self, k: usize, n: usize) -> PointLanes<'_> {
+        let mut bsdf = [[0.0; LANES]; 2];
+        for (to, from) in bsdf.iter_mut().zip(&self.bsdf) {
+            to[..n].copy_from_slice(&from[k..k + n]);
+        }
+        let ids = &self.ids;
+        PointLanes {
+            samplers: &ids.samplers[k..k + n],
+            indices: &ids.indices[k..k + n],
+            keys: &ids.keys[k..k + n],
+            bsdf,
         }
     }
 

@@ -38,34 +38,58 @@ pub(super) struct Surface<'a> {
 
 /// What is the same for all points of a material: asked for once, not at each.
 #[derive(Clone, Copy)]
-struct Look {
-    transmission: Option<Transmission>,
+pub(super) struct Look {
+    pub transmission: Option<Transmission>,
     is_black: bool,
     is_delta: bool,
-    picks_lobe: bool,
+    pub picks_lobe: bool,
 }
 
 /// The material of the last point.
 #[derive(Default)]
-pub(super) struct LastLook<'a>(Option<(u32, u32, &'a dyn Material, Look)>);
+pub(super) struct LastLook<'a> {
+    of: Option<(u32, u32)>,
+    last: Option<(&'a dyn Material, Look)>,
+    /// Its numbers, where all points have the same.
+    prepared: Option<Prepared>,
+}
+
+/// A material whose points are all alike.
+pub(super) struct Plain<'a> {
+    pub material: &'a dyn Material,
+    pub look: Look,
+    pub prepared: Prepared,
+}
 
 impl<'a> LastLook<'a> {
     #[inline(always)]
-    fn of(&mut self, scene: &'a Scene, v: &Vertex) -> (&'a dyn Material, Look) {
-        if let Some((object, slot, material, look)) = self.0
-            && (object, slot) == (v.object, v.slot)
-        {
-            return (material, look);
+    fn of(&mut self, scene: &'a Scene, (object, slot): (u32, u32)) -> (&'a dyn Material, Look) {
+        match self.last {
+            Some(last) if self.of == Some((object, slot)) => last,
+            _ => self.ask(scene, (object, slot)),
         }
-        let material = scene.material(v);
+    }
+
+    fn ask(&mut self, scene: &'a Scene, (object, slot): (u32, u32)) -> (&'a dyn Material, Look) {
+        let material = scene.material_of(object, slot);
         let look = Look {
             transmission: material.transmission(),
             is_black: material.is_black(),
             is_delta: material.is_delta(),
             picks_lobe: material.picks_lobe(),
         };
-        self.0 = Some((v.object, v.slot, material, look));
+        let plain = !look.is_black && !scene.lights.is_emitting(object);
+        self.prepared = if plain { material.prepared_everywhere() } else { None };
+        (self.of, self.last) = (Some((object, slot)), Some((material, look)));
         (material, look)
+    }
+
+    /// What all points of a slot have in common, if that is all there is to know of their material, and they scatter
+    /// but do not shine.
+    #[inline(always)]
+    pub fn plain(&mut self, scene: &'a Scene, slot: (u32, u32)) -> Option<Plain<'a>> {
+        let (material, look) = self.of(scene, slot);
+        self.prepared.map(|prepared| Plain { material, look, prepared })
     }
 }
 
@@ -82,7 +106,7 @@ impl<'a> Surface<'a> {
         state: PathState,
         number: usize,
     ) -> Self {
-        let (material, look) = last.of(scene, &v);
+        let (material, look) = last.of(scene, (v.object, v.slot));
         let wo = v.frame.to_local(v.wo);
         let receiver = if look.transmission.is_some() { v.receiver_all_round() } else { v.receiver() };
         Surface { v, state, number, material, look, prepared: Prepared::default(), wo, receiver, lit: None }

@@ -1,13 +1,15 @@
 //! Lambert's surface, lit and seen from the same side, whichever it is.
 
 use crate::base::directions::{DirectionLanes, LANES};
-use crate::base::material::{BsdfEval, BsdfLanes, BsdfSample, Material, Prepared, Scattering};
+use crate::base::lanes::{Columns, LANES as MANY};
+use crate::base::material::{BsdfEval, BsdfLanes, BsdfSample, Material, Prepared, SampleLanes, Scattering};
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::base::shape::Needs;
 use crate::base::vertex::Vertex;
 use crate::color::Rgb;
 use crate::error::Result;
 use crate::materials::reflectance::Reflectance;
+use crate::math::simd::{Kernel, dispatch};
 use crate::sampling::warp::{cosine_hemisphere, cosine_hemisphere_pdf};
 use glam::{Vec2, Vec3};
 use std::sync::Arc;
@@ -51,6 +53,14 @@ impl Material for Diffuse {
         *out.view_mut::<Rgb>() = self.albedo.at(vertex);
     }
 
+    fn prepared_everywhere(&self) -> Option<Prepared> {
+        self.albedo.constant().map(|albedo| {
+            let mut out = Prepared::default();
+            *out.view_mut::<Rgb>() = albedo;
+            out
+        })
+    }
+
     #[inline]
     fn eval(&self, m: &Prepared, wo: Vec3, wi: Vec3) -> BsdfEval {
         if wo.z * wi.z <= 0.0 {
@@ -88,6 +98,19 @@ impl Material for Diffuse {
         (wo.z * wi.z > 0.0).then(|| BsdfSample { wi, weight: *m.view::<Rgb>(), pdf, delta: false })
     }
 
+    fn sample_many(
+        &self,
+        m: &Prepared,
+        wo: &Columns<f32>,
+        u: &[[f32; MANY]; 2],
+        _uc: &[f32; MANY],
+        _n: usize,
+    ) -> SampleLanes {
+        let mut out = SampleLanes::default();
+        dispatch(SampleMany { albedo: *m.view::<Rgb>(), wo, u, out: &mut out });
+        out
+    }
+
     fn scattering(&self, m: &Prepared) -> Option<Scattering> {
         let even = m.view::<Rgb>().luminance() * std::f32::consts::FRAC_1_PI;
         Some(Scattering { even, ..Scattering::EVEN })
@@ -103,5 +126,39 @@ impl Material for Diffuse {
 
     fn is_black(&self) -> bool {
         self.albedo.is_black()
+    }
+}
+
+/// [`Diffuse::sample`] of all lanes.
+struct SampleMany<'a> {
+    albedo: Rgb,
+    wo: &'a Columns<f32>,
+    u: &'a [[f32; MANY]; 2],
+    out: &'a mut SampleLanes,
+}
+
+impl Kernel for SampleMany<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        sample_many(self.albedo, self.wo, self.u, self.out);
+    }
+}
+
+// A function of its own: the compiler knows of arguments, but not of a struct's fields, that they do not overlap.
+#[inline(always)]
+fn sample_many(albedo: Rgb, wo: &Columns<f32>, u: &[[f32; MANY]; 2], out: &mut SampleLanes) {
+    let albedo = albedo.to_array();
+    for k in 0..MANY {
+        let wi = cosine_hemisphere(Vec2::new(u[0][k], u[1][k]));
+        let z = wo.0[2][k];
+        out.pdf[k] = cosine_hemisphere_pdf(wi.z);
+        let up = if z < 0.0 { -wi.z } else { wi.z };
+        out.wi.set(k, Vec3::new(wi.x, wi.y, up));
+        let scatters = z * up > 0.0;
+        for (column, albedo) in out.weight.0.iter_mut().zip(albedo) {
+            column[k] = if scatters { albedo } else { 0.0 };
+        }
     }
 }

@@ -159,7 +159,13 @@ impl Scene {
     /// The material at a vertex.
     #[inline]
     pub fn material(&self, v: &Vertex) -> &dyn Material {
-        self.objects[v.object as usize].materials[v.slot as usize].as_ref()
+        self.material_of(v.object, v.slot)
+    }
+
+    /// The material in a slot of an object.
+    #[inline]
+    pub fn material_of(&self, object: u32, slot: u32) -> &dyn Material {
+        self.objects[object as usize].materials[slot as usize].as_ref()
     }
 }
 
@@ -174,8 +180,13 @@ impl Lights {
     #[inline]
     pub fn of_vertex(&self, v: &Vertex) -> Option<u32> {
         // Most vertices lie on nothing that emits, and need not be looked for.
-        let emits = self.emitting_objects.get(v.object as usize).is_some_and(|emits| *emits);
-        if emits { self.by_path.get(&v.path).copied() } else { None }
+        if self.is_emitting(v.object) { self.by_path.get(&v.path).copied() } else { None }
+    }
+
+    /// Whether a material of an object emits.
+    #[inline]
+    pub fn is_emitting(&self, object: u32) -> bool {
+        self.emitting_objects.get(object as usize).is_some_and(|emits| *emits)
     }
 
     /// What paths which leave the scene end on, if it is the same in all directions.
