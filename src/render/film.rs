@@ -1,9 +1,10 @@
 //! The film: exact sums of filtered samples (see [`super::fixed`] for step and ranges), with what later error
 //! estimates need: two half-buffers a pixel, and per tile the luminance of a few independent replicates.
 //!
-//! A pixel takes 64 bytes. Threads accumulate into a [`FilmTile`] of their own, without locks, and add it to
+//! A pixel takes 36 bytes, or 64 where both halves have samples. Threads accumulate into a [`FilmTile`] of their own, without locks, and add it to
 //! the [`Film`] when it is done; as only integers are added, the order in which that happens leaves no trace.
 
+mod store;
 mod tile;
 
 pub use tile::{FilmSample, FilmTile};
@@ -13,6 +14,7 @@ use crate::base::pixel_rect::PixelRect;
 use crate::color::Rgb;
 use crate::image::picture::{Picture, SampleKind};
 use rayon::prelude::*;
+use store::Store;
 
 /// Side of a film tile in pixels.
 pub const TILE_SIDE: u32 = 16;
@@ -28,7 +30,6 @@ pub const BYTES_PER_PIXEL: u64 = 64 + 24;
 
 /// Sums of one pixel, in steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[repr(C, align(64))]
 struct PixelSums {
     /// Red, green and blue of the even and of the odd replicates.
     halves: [[i64; 3]; 2],
@@ -155,7 +156,7 @@ pub struct FilmCounts {
 pub struct Film {
     frame: [u32; 2],
     window: PixelRect,
-    pixels: Vec<PixelSums>,
+    pixels: Store,
     tiles: Vec<[ReplicateSum; REPLICATES]>,
     dropped: u64,
     saturated: u64,
@@ -168,7 +169,7 @@ impl Film {
         Film {
             frame: [width, height],
             window,
-            pixels: vec![PixelSums::default(); window.area()],
+            pixels: Store::new(window.area()),
             tiles: vec![Default::default(); window.tiles(TILE_SIDE).count()],
             dropped: 0,
             saturated: 0,
@@ -200,11 +201,12 @@ impl Film {
             && (rect.x0 - self.window.x0).is_multiple_of(TILE_SIDE)
             && (rect.y0 - self.window.y0).is_multiple_of(TILE_SIDE);
         assert!(aligned && rect.area() > 0, "{rect:?} is no tile of {:?}", self.window);
+        let index = self.tile_index(rect.x0, rect.y0);
+        let fresh = self.tiles[index].iter().all(|r| r.count == 0);
         for y in rect.y0..rect.y1 {
             let at = self.window.index(rect.x0, y);
-            tile.add_row_to(y, &mut self.pixels[at..at + rect.width() as usize]);
+            tile.add_row_to(y, &mut self.pixels, at..at + rect.width() as usize, fresh);
         }
-        let index = self.tile_index(rect.x0, rect.y0);
         self.tiles[index].iter_mut().zip(&tile.replicates()).for_each(|(mine, add)| mine.merge(add));
         self.dropped += tile.dropped;
         self.saturated += tile.saturated;
@@ -216,7 +218,7 @@ impl Film {
     /// If frame or window differ.
     pub fn merge(&mut self, other: &Film) {
         assert_eq!((self.frame, self.window), (other.frame, other.window), "films of different windows");
-        self.pixels.iter_mut().zip(&other.pixels).for_each(|(mine, add)| mine.merge(add));
+        self.pixels.merge(&other.pixels);
         let mine = self.tiles.as_flattened_mut().iter_mut();
         mine.zip(other.tiles.as_flattened()).for_each(|(mine, add)| mine.merge(add));
         self.dropped += other.dropped;
@@ -226,32 +228,36 @@ impl Film {
     /// Samples in, dropped, clamped; pixels out of range.
     pub fn counts(&self) -> FilmCounts {
         FilmCounts {
-            samples: self.pixels.iter().map(PixelSums::count).sum(),
+            samples: self.pixels.iter().map(|p| p.count()).sum(),
             dropped: self.dropped,
             saturated: self.saturated,
             overflowed_pixels: self.pixels.iter().filter(|p| p.at_limit()).count() as u64,
         }
     }
 
+    fn sums(&self, x: u32, y: u32) -> PixelSums {
+        self.pixels.get(self.window.index(x, y))
+    }
+
     /// Mean radiance of a pixel in the window; black where there is no sample. Colour is associated with alpha:
     /// it is not to be multiplied by it again.
     pub fn mean(&self, x: u32, y: u32) -> Rgb {
-        Rgb::from(self.pixels[self.window.index(x, y)].mean().map(|v| v as f32))
+        Rgb::from(self.sums(x, y).mean().map(|v| v as f32))
     }
 
     /// Mean alpha of a pixel in the window.
     pub fn alpha(&self, x: u32, y: u32) -> f32 {
-        self.pixels[self.window.index(x, y)].alpha()
+        self.sums(x, y).alpha()
     }
 
     /// Samples of a pixel in the window.
     pub fn sample_count(&self, x: u32, y: u32) -> u64 {
-        self.pixels[self.window.index(x, y)].count()
+        self.sums(x, y).count()
     }
 
     /// A pixel's two half-buffers, which are independent of each other; `None` where one has no sample.
     pub fn halves(&self, x: u32, y: u32) -> Option<[Half; 2]> {
-        let pixel = &self.pixels[self.window.index(x, y)];
+        let pixel = self.sums(x, y);
         let half = |h: usize| {
             let count = u64::from(pixel.counts[h]);
             Half { mean: pixel.halves[h].map(|sum| mean_of(sum, count)), count }
@@ -267,8 +273,9 @@ impl Film {
         let mut planes: [Vec<f32>; 4] = std::array::from_fn(|_| vec![0.0; self.pixels.len()]);
         let row = self.window.width().max(1) as usize;
         let [r, g, b, a] = planes.each_mut().map(|plane| plane.par_chunks_mut(row));
-        (self.pixels.par_chunks(row), r, g, b, a).into_par_iter().for_each(|(pixels, r, g, b, a)| {
-            for (i, pixel) in pixels.iter().enumerate() {
+        (r, g, b, a).into_par_iter().enumerate().for_each(|(y, (r, g, b, a))| {
+            for i in 0..r.len() {
+                let pixel = self.pixels.get(y * row + i);
                 [r[i], g[i], b[i]] = pixel.mean().map(|v| v as f32);
                 a[i] = pixel.alpha();
             }
@@ -291,7 +298,7 @@ impl Film {
     ///
     /// `None` where no pixel has samples in both halves.
     pub fn variance(&self, radius: u32) -> Option<[Vec<f32>; 3]> {
-        let raw: Vec<Option<[f64; 3]>> = self.pixels.iter().map(PixelSums::variance).collect();
+        let raw: Vec<Option<[f64; 3]>> = self.pixels.iter().map(|p| p.variance()).collect();
         let all = Pool::of(raw.iter().flatten());
         if all.count == 0.0 {
             return None;

@@ -1,9 +1,11 @@
 //! A thread's own piece of film.
 
+use super::store::Store;
 use super::{PixelSums, REPLICATES, ReplicateSum, TILE_SIDE};
 use crate::base::pixel_rect::PixelRect;
 use crate::color::Rgb;
 use crate::render::fixed::{SMALL_LIMIT_LOG2, STEPS_LOG2, quantise, quantise_small};
+use std::ops::Range;
 
 const SIDE: usize = TILE_SIDE as usize;
 
@@ -46,9 +48,8 @@ fn accumulate(sum: &mut Lanes, steps: Lanes) {
 #[derive(Debug, Clone)]
 pub struct FilmTile {
     rect: PixelRect,
-    /// By pixel ([`TILE_SIDE`] a row, whatever the width of `rect`), then by half.
-    sums: Box<[[Lanes; 2]; SIDE * SIDE]>,
-    counts: Box<[[u32; 2]; SIDE * SIDE]>,
+    /// By half, then by pixel ([`TILE_SIDE`] a row, whatever the width of `rect`).
+    halves: [Sums; 2],
     by_replicate: [Lanes; REPLICATES],
     replicate_counts: [u64; REPLICATES],
     /// Samples since the last flush; below [`FLUSH_AFTER`].
@@ -60,6 +61,29 @@ pub struct FilmTile {
     pub(super) saturated: u64,
 }
 
+/// Sums of one half.
+#[derive(Debug, Clone)]
+struct Sums {
+    sums: Box<[Lanes; SIDE * SIDE]>,
+    counts: Box<[u32; SIDE * SIDE]>,
+    /// Whether anything was added: most tiles have samples of one half alone, or none.
+    used: bool,
+}
+
+impl Sums {
+    fn new() -> Self {
+        Sums { sums: Box::new([[0; 4]; SIDE * SIDE]), counts: Box::new([0; SIDE * SIDE]), used: false }
+    }
+
+    fn clear(&mut self) {
+        if self.used {
+            self.sums.fill([0; 4]);
+            self.counts.fill(0);
+            self.used = false;
+        }
+    }
+}
+
 impl FilmTile {
     /// An empty tile.
     ///
@@ -68,8 +92,7 @@ impl FilmTile {
     pub fn new(rect: PixelRect) -> Self {
         let mut tile = FilmTile {
             rect,
-            sums: Box::new([[[0; 4]; 2]; SIDE * SIDE]),
-            counts: Box::new([[0; 2]; SIDE * SIDE]),
+            halves: [Sums::new(), Sums::new()],
             by_replicate: Default::default(),
             replicate_counts: Default::default(),
             pending: 0,
@@ -92,8 +115,7 @@ impl FilmTile {
             "{rect:?} is larger than a film tile"
         );
         self.rect = rect;
-        self.sums.fill(Default::default());
-        self.counts.fill(Default::default());
+        self.halves.iter_mut().for_each(Sums::clear);
         self.by_replicate = Default::default();
         self.replicate_counts = Default::default();
         self.pending = 0;
@@ -178,13 +200,17 @@ impl FilmTile {
 
     #[inline]
     fn add_steps(&mut self, at: usize, replicate: usize, steps: Lanes) {
-        accumulate(&mut self.sums[at][replicate & 1], steps);
+        let half = &mut self.halves[replicate & 1];
+        half.used = true;
+        accumulate(&mut half.sums[at], steps);
         accumulate(&mut self.by_replicate[replicate], steps);
     }
 
     #[inline]
     fn count(&mut self, at: usize, replicate: usize, n: usize) {
-        self.counts[at][replicate & 1] += n as u32;
+        let half = &mut self.halves[replicate & 1];
+        half.used = true;
+        half.counts[at] += n as u32;
         self.replicate_counts[replicate] += n as u64;
         self.pending += n;
     }
@@ -205,11 +231,10 @@ impl FilmTile {
     #[inline(never)]
     fn flush(&mut self) {
         let wide = wide_of(&mut self.wide);
-        for (to, (sums, counts)) in wide.iter_mut().zip(self.sums.iter_mut().zip(self.counts.iter_mut())) {
-            to.merge(&PixelSums::from_lanes(sums, *counts));
-            *sums = Default::default();
-            *counts = Default::default();
+        for (at, to) in wide.iter_mut().enumerate() {
+            to.merge(&sums_at(&self.halves, at));
         }
+        self.halves.iter_mut().for_each(Sums::clear);
         self.wide_replicates = self.replicates();
         self.by_replicate = Default::default();
         self.replicate_counts = Default::default();
@@ -224,16 +249,26 @@ impl FilmTile {
         all
     }
 
-    /// Adds row `y` to `row`, the film's pixels of the same place.
-    pub(super) fn add_row_to(&self, y: u32, row: &mut [PixelSums]) {
+    /// Adds row `y` to the film's pixels of the same place, which are zero if `fresh`.
+    pub(super) fn add_row_to(&self, y: u32, film: &mut Store, row: Range<usize>, fresh: bool) {
         let first = (y - self.rect.y0) as usize * SIDE;
+        if let (None, [even, Sums { used: false, .. }]) = (&self.wide, &self.halves) {
+            let mine = first..first + row.len();
+            return film.add_first(row, &even.sums[mine.clone()], &even.counts[mine], fresh);
+        }
         for (at, pixel) in (first..first + SIDE).zip(row) {
             if let Some(wide) = &self.wide {
-                pixel.merge(&wide[at]);
+                film.add(pixel, &wide[at]);
             }
-            pixel.merge(&PixelSums::from_lanes(&self.sums[at], self.counts[at]));
+            film.add(pixel, &sums_at(&self.halves, at));
         }
     }
+}
+
+#[inline]
+fn sums_at(halves: &[Sums; 2], at: usize) -> PixelSums {
+    let [a, b] = halves;
+    PixelSums::from_lanes(&[a.sums[at], b.sums[at]], [a.counts[at], b.counts[at]])
 }
 
 fn wide_of(wide: &mut Option<Box<[PixelSums]>>) -> &mut [PixelSums] {
