@@ -75,13 +75,7 @@ impl Vertices {
     /// The points of some hits, at most [`LANES`], given by their numbers.
     pub fn find(&mut self, rays: &RayBatch, hits: &HitBatch, which: &[u32], met: &Met) {
         let n = which.len().min(LANES);
-        for (lane, &i) in which[..n].iter().enumerate() {
-            let (i, given) = (i as usize, &mut self.given);
-            given.o.set(lane, Vec3::new(rays.ox[i], rays.oy[i], rays.oz[i]));
-            given.d.set(lane, Vec3::new(rays.dx[i], rays.dy[i], rays.dz[i]));
-            (given.tnear[lane], given.tfar[lane]) = (rays.tnear[i], rays.tfar[i]);
-            self.hits[lane] = Hit { t: hits.t[i], prim: hits.prim[i], path: hits.path[i] };
-        }
+        self.gather(rays, hits, &which[..n]);
         let Vertices { given, rays, surfaces, points, .. } = self;
         dispatch(Localise { given, placement: met.placement, rays });
         met.shape.refine_batch(rays, &self.hits[..n], met.needs, surfaces);
@@ -92,6 +86,25 @@ impl Vertices {
         }
         if met.needs != Needs::default() {
             self.textured(n, met);
+        }
+    }
+
+    /// Rays and hits into their lanes.
+    #[inline(always)]
+    fn gather(&mut self, rays: &RayBatch, hits: &HitBatch, which: &[u32]) {
+        // Slices of one length, so that a number is checked once and not for every column.
+        let len = rays.len();
+        let [ox, oy, oz] = [&rays.ox[..len], &rays.oy[..len], &rays.oz[..len]];
+        let [dx, dy, dz] = [&rays.dx[..len], &rays.dy[..len], &rays.dz[..len]];
+        let (tnear, tfar) = (&rays.tnear[..len], &rays.tfar[..len]);
+        let (t, prim, path) = (&hits.t[..len], &hits.prim[..len], &hits.path[..len]);
+        let given = &mut self.given;
+        for (lane, &i) in which.iter().take(LANES).enumerate() {
+            let i = i as usize;
+            given.o.set(lane, Vec3::new(ox[i], oy[i], oz[i]));
+            given.d.set(lane, Vec3::new(dx[i], dy[i], dz[i]));
+            (given.tnear[lane], given.tfar[lane]) = (tnear[i], tfar[i]);
+            self.hits[lane] = Hit { t: t[i], prim: prim[i], path: path[i] };
         }
     }
 

@@ -82,10 +82,7 @@ impl Block<'_> {
     ) {
         work.counts.shadow += rays.len() as u64;
         self.scene.kernel.occluded_batch(rays, &mut work.blocked, Coherence::Incoherent);
-        paths.escapes.clear();
-        for (i, _) in work.blocked.iter().enumerate().filter(|(_, blocked)| !**blocked) {
-            paths.escapes.push(i as u32, rays.direction(i));
-        }
+        paths.escapes.pick(rays, |i| !work.blocked[i]);
         self.add_escapes(paths, out);
     }
 

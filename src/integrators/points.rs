@@ -40,14 +40,18 @@ pub struct PointLanes<'a> {
 
 impl VertexPoints {
     /// Draws for `paths` (indices into `ids`) at a depth.
-    pub fn draw(&mut self, ids: &PathIds, paths: impl Iterator<Item = u32>, depth: u32, with_light: bool) {
+    pub fn draw(
+        &mut self,
+        ids: &PathIds,
+        paths: impl Iterator<Item = u32> + Clone,
+        depth: u32,
+        with_light: bool,
+    ) {
         self.ids.clear();
-        for i in paths {
-            let id = ids.get(i as usize);
-            self.ids.samplers.push(id.sampler);
-            self.ids.indices.push(id.index);
-            self.ids.keys.push(id.key);
-        }
+        // Column by column, of a length that is known: nothing grows on the way.
+        self.ids.samplers.extend(paths.clone().map(|i| ids.samplers[i as usize]));
+        self.ids.indices.extend(paths.clone().map(|i| ids.indices[i as usize]));
+        self.ids.keys.extend(paths.map(|i| ids.keys[i as usize]));
         fill(&self.ids, Dim::at(depth, Slot::BsdfUv), &mut self.bsdf);
         if with_light {
             fill(&self.ids, Dim::at(depth, Slot::LightUv), &mut self.light);

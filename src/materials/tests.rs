@@ -1,6 +1,7 @@
 //! What every material must satisfy, whatever it is.
 
 use crate::base::directions::{DirectionLanes, LANES};
+use crate::base::lanes::{Columns, LANES as MANY};
 use crate::base::material::{BsdfEval, Material, Prepared};
 use crate::base::registry::{Params, Row, Value, build};
 use crate::base::shape::Needs;
@@ -229,6 +230,41 @@ fn directions_evaluated_together_are_as_each() {
                 let got = all.f_cos.map(|channel| channel[k]);
                 assert_eq!((got, all.pdf[k]), (e.f_cos.to_array(), e.pdf), "{}", m.label);
             }
+        }
+    }
+}
+
+#[test]
+fn directions_sampled_together_are_as_each() {
+    for m in members() {
+        let mut rng = TestRng::new(14);
+        for _ in 0..50 {
+            let (mut wo, mut u, mut uc) = (Columns::<f32>::default(), [[0.0; MANY]; 2], [0.0; MANY]);
+            for k in 0..MANY {
+                wo.set(k, rng.direction());
+                ([u[0][k], u[1][k]], uc[k]) = (rng.vec2().into(), rng.f32());
+            }
+            let n = MANY - 3;
+            let all = m.it.sample_many(&m.prepared, &wo, &u, &uc, n);
+            for k in 0..n {
+                let weight: [f32; 3] = all.weight.get(k).into();
+                match m.sample(wo.get(k), [u[0][k], u[1][k]], uc[k]) {
+                    Some(s) => {
+                        let got = (all.wi.get(k), weight, all.pdf[k], all.delta[k]);
+                        assert_eq!(got, (s.wi, s.weight.to_array(), s.pdf, s.delta), "{}", m.label);
+                    }
+                    None => assert_eq!(weight, [0.0; 3], "{}", m.label),
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_prepared_everywhere_is_so() {
+    for m in members() {
+        if let Some(prepared) = m.it.prepared_everywhere() {
+            assert_eq!(prepared, m.prepared, "{}", m.label);
         }
     }
 }
