@@ -89,8 +89,13 @@ fn main() {
         let mut rays = [0; 2];
         for y in (0..size[1]).step_by(BAND as usize) {
             let crop = PixelRect::new(0, y, size[0], size[1].min(y + BAND));
-            let settings =
-                RenderSettings { crop, spp: o.spp, threads: o.threads, ..RenderSettings::new(size) };
+            let settings = RenderSettings {
+                crop,
+                spp: o.spp,
+                threads: o.threads,
+                by_need: false,
+                ..RenderSettings::new(size)
+            };
             let t = band(&mut scene, &integrator, settings, &recorder, &tape, &bare, &pool);
             sum.render += t.render;
             sum.kernel += t.kernel;
