@@ -11,8 +11,9 @@ use crate::sampling::mis::power;
 use crate::scene::Scene;
 use glam::Vec3;
 
-/// Shadow rays that are traced together, at least, if there are as many.
-const MANY_SHADOWS: usize = 1024;
+/// Shadow rays that are traced together, at least, if there are as many. A quarter of this is 2 % slower; to trace them in the
+/// order of their directions, put into 8 or some 40 bins, gained nothing (1.0 to 1.05 times the time).
+const MANY_SHADOWS: usize = 4096;
 
 /// What is the same for all paths of a depth.
 pub(super) struct Block<'a> {

@@ -143,7 +143,7 @@ const SAMPLE_COST: f64 = 2.0;
 /// sample.
 const RAY_COSTS: [f64; 3] = [0.5, 1.6, 1.6];
 /// What a sample that meets no surface costs in all, in the same.
-pub const BARE_COST: f64 = 0.12;
+pub const BARE_COST: f64 = 0.2;
 
 /// Rays counted by kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

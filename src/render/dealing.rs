@@ -5,8 +5,8 @@
 //! A pixel's own samples must have no say in their number, or those that happen to agree end too soon (Kirk and Arvo 1991).
 //! So the film is coloured like a chessboard: what white pixels need is read off the black ones around them, and what black
 //! ones need off the white. Points of different pixels are independent where samples are dealt by need, hence numbers and
-//! samples of a pixel are, and its mean is unbiased (but for what the two mean costs of a sample, which are counted over the
-//! whole film, know of one pixel). Totals are powers of two, of one sequence of points from the first sample to the last.
+//! samples of a pixel are, and its mean is unbiased (but for what the two mean costs of a sample, which are counted
+//! over the whole film, know of one pixel). Totals are powers of two, of one sequence of points from the first sample to the last.
 
 use super::outlines::Outlines;
 use crate::base::pixel_rect::PixelRect;
@@ -22,10 +22,23 @@ const FIRST: u32 = 2;
 const MOST_LOG2: u32 = 4;
 /// Part of the squared mean that is added to a pixel's own, as in relMSE: what a dark pixel counts for.
 const EPSILON: f64 = 0.01;
-/// How far a pixel looks for others of its kind, in each direction.
-const REACH: u32 = 2;
-/// What those count that do not share an edge with it: little, where one does. Need changes from pixel to pixel.
+/// What those count that do not share an edge with a pixel: little, where one does. Need changes from pixel to pixel.
 const FAR: f64 = 1.0 / 32.0;
+/// Pixels of the other colour within two rows and columns, and what they count.
+const NEAR: [(i32, i32, f64); 12] = [
+    (0, -1, 1.0),
+    (-1, 0, 1.0),
+    (1, 0, 1.0),
+    (0, 1, 1.0),
+    (-1, -2, FAR),
+    (1, -2, FAR),
+    (-2, -1, FAR),
+    (2, -1, FAR),
+    (-2, 1, FAR),
+    (2, 1, FAR),
+    (-1, 2, FAR),
+    (1, 2, FAR),
+];
 /// Samples go as what they are worth to this power. Where squared errors fall as n^-a the best is 1 / (1 + a), the root for
 /// independent samples; less where worth is a guess and numbers are powers of two.
 const POWER: f64 = 0.4;
@@ -173,18 +186,18 @@ impl Notes {
         let plain = self.cost(Kind::Plain, &self.spent.plain, 1);
         let costs = [plain, self.cost(Kind::Outline, &self.spent.outlines, times)];
         let means = [0, 1].map(|colour| self.mean_of(1 - colour));
-        let rows: Vec<u32> = (self.rect.y0..self.rect.y1).collect();
-        let columns = self.rect.x0..self.rect.x1;
         let dealer = Dealer { first, spp, most: (spp.ilog2() + MOST_LOG2).min(u32::BITS - 1) };
-        let guess = |x, y| self.guess(x, y, means[colour(x, y)], costs, &dealer);
-        let guesses: Vec<Guess> = rows
-            .par_iter()
-            .flat_map_iter(|&y| columns.clone().map(move |x| (x, y)))
-            .map(|(x, y)| guess(x, y))
-            .collect();
+        let width = self.rect.width() as usize;
+        let place = |at: usize| (self.rect.x0 + (at % width) as u32, self.rect.y0 + (at / width) as u32);
+        let guess = |at: usize| {
+            let (x, y) = place(at);
+            self.guess(x, y, means[colour(x, y)], costs, &dealer)
+        };
+        let guesses: Vec<Guess> =
+            (0..self.list.len()).into_par_iter().with_min_len(1 << 12).map(guess).collect();
         let scales = [0, 1].map(|wanted| {
-            let of_colour = self.rect.pixels().zip(&guesses).filter(|(p, _)| colour(p.0, p.1) == wanted);
-            dealer.scale(of_colour.map(|(_, g)| g))
+            let rows = self.rect.pixels().zip(&guesses);
+            dealer.scale(rows.filter(|((x, y), _)| colour(*x, *y) == wanted).map(|(_, g)| g))
         });
         let count = |((x, y), g): ((u32, u32), &Guess)| dealer.count(g.share + scales[colour(x, y)], g.least);
         Counts { rect: self.rect, list: self.rect.pixels().zip(&guesses).map(count).collect(), bare: spp }
@@ -224,12 +237,13 @@ impl Notes {
     /// Sums over the neighbours that speak for a pixel of a kind: of their weights, and weighted of their means, variances,
     /// and parts that meet a surface.
     fn around(&self, x: u32, y: u32, kind: Kind) -> [f64; 4] {
-        let near =
-            PixelRect::new(x.saturating_sub(REACH), y.saturating_sub(REACH), x + REACH + 1, y + REACH + 1);
         let [mut same, mut any] = [[0.0f64; 4]; 2];
-        for (i, j) in near.intersection(&self.rect).pixels().filter(|p| colour(p.0, p.1) != colour(x, y)) {
+        for (dx, dy, weight) in NEAR {
+            let (i, j) = (x.wrapping_add_signed(dx), y.wrapping_add_signed(dy));
+            if !self.rect.contains(i, j) {
+                continue;
+            }
             let note = &self.list[self.rect.index(i, j)];
-            let weight = if x.abs_diff(i) + y.abs_diff(j) == 1 { 1.0 } else { FAR };
             let values = [1.0, note.mean, note.variance, note.alpha].map(|v| weight * f64::from(v));
             let sums = match note.kind {
                 Kind::Bare => continue,
@@ -276,14 +290,14 @@ impl Dealer {
             histogram[at][usize::from(g.least > self.first)] += g.cost;
         }
         let floors = [self.first, 1 << self.spp.ilog2()];
-        let spent = |scale: f64| {
-            let bins = histogram.iter().enumerate().filter(|b| b.1[0] + b.1[1] > 0.0);
-            let of_bin = |(at, costs): (usize, &[f64; 2])| {
-                let share = (at as f64 + 0.5) / STEPS - 0.5 * DOUBLINGS + scale;
-                (0..2).map(|i| costs[i] * f64::from(self.count(share, floors[i]))).sum::<f64>()
-            };
-            bins.map(of_bin).sum::<f64>()
+        let bins: Vec<(f64, [f64; 2])> = (histogram.iter().enumerate())
+            .filter(|(_, costs)| costs[0] + costs[1] > 0.0)
+            .map(|(at, costs)| ((at as f64 + 0.5) / STEPS - 0.5 * DOUBLINGS, *costs))
+            .collect();
+        let of_bin = |share: f64, costs: &[f64; 2]| {
+            (0..2).map(|i| costs[i] * f64::from(self.count(share, floors[i]))).sum::<f64>()
         };
+        let spent = |scale: f64| bins.iter().map(|(share, costs)| of_bin(share + scale, costs)).sum::<f64>();
         let (mut low, mut high) = (-DOUBLINGS, DOUBLINGS);
         for _ in 0..40 {
             let middle = 0.5 * (low + high);

@@ -74,8 +74,8 @@ fn numbers_go_by_noise_and_cost() {
             .map(|l| l - f64::from(counts.of(20, 20)).log2()),
         [0.0, 2.0]
     );
-    // The same noise of a pixel three times as dark is nine times as bad: 9^0.4 is 2.4.
-    let counts = notes(|x, _| plain(if x < 40 { 3.0 } else { 1.0 }, 1.0)).deal(8, 32, None);
+    // The same noise of a pixel 2^1.25 times as dark counts 2^2.5 times as much: to the power 0.4 that is twice.
+    let counts = notes(|x, _| plain(if x < 40 { 1.25f32.exp2() } else { 1.0 }, 1.0)).deal(8, 32, None);
     assert_eq!(counts.of(60, 20), 2 * counts.of(20, 20));
     // Samples that mostly meet nothing are cheap.
     let half = |x: u32| if x < 40 { 1.0 } else { 0.01 };
