@@ -59,7 +59,7 @@ struct SamplingArgs {
     /// Longest path in surfaces, the camera's first hit counted
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     max_depth: Option<u32>,
-    /// Point set [default: zsobol; with --time or a target the same as owen-sobol]
+    /// Point set [default: zsobol, which is the same as owen-sobol where samples are dealt by need, with --time or a target]
     #[arg(long, value_name = "NAME")]
     sampler: Option<String>,
     /// Pixel filter [default: blackman-harris]

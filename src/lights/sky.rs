@@ -85,16 +85,17 @@ impl SkyLight {
         let levels = match sampling {
             SkySampling::Table => Level::all(&*sky),
             _ if is_plain => Vec::new(),
-            SkySampling::Product => vec![Level::finest(&*sky)],
-            SkySampling::Compensated | SkySampling::Cosine => Level::all(&*sky),
+            s if s.is_product() => vec![Level::finest(&*sky)],
+            _ => Level::all(&*sky),
         };
         let plan = match sampling {
-            SkySampling::Product if !is_plain => None,
+            s if s.is_product() && !is_plain => None,
             _ => Some(plan_of(&levels)),
         };
         let Some(plan) = plan else {
             let discs = place(&vec![0.0; sky.discs().len()]);
-            let table = ProductTable::new(&*sky, &levels[0], &discs, turn, intensity);
+            let is_fine = sampling == SkySampling::Product;
+            let table = ProductTable::new(&*sky, &levels[0], &discs, (turn, intensity), is_fine);
             let map_total = table.as_ref().map_or(0.0, |t| t.map_flux());
             let total = (map_total + disc_total) * f64::from(intensity);
             let map = table.map_or(MapSampler::None, |t| MapSampler::Product(Box::new(t)));
@@ -241,7 +242,7 @@ fn plan_constant(sky: &dyn Skybox, levels: &[Level], luminance: f64, sampling: S
         map_total: 4.0 * PI * luminance,
     };
     match sampling {
-        SkySampling::Product | SkySampling::Compensated if sky.discs().is_empty() => none,
+        s if (s.is_product() || s == SkySampling::Compensated) && sky.discs().is_empty() => none,
         SkySampling::Cosine if sky.discs().is_empty() => Plan { map_share: 1.0, ..none },
         _ => plan::plan(sky, levels, sampling),
     }

@@ -10,6 +10,9 @@ pub enum SkySampling {
     /// to BSDF sampling. The best use of time under most skies (measured: benches/README.md).
     #[default]
     Product,
+    /// The same without two refinements: what lies within a cell is drawn evenly, and suns have half of the light samples,
+    /// however many a surface point takes. For comparison.
+    ProductCells,
     /// By the luminance that rises above the average, where that pays: BSDF sampling finds the rest as well (Karlik et
     /// al. 2019). Under a constant sky nothing is left and there is no sample.
     Compensated,
@@ -21,8 +24,9 @@ pub enum SkySampling {
 
 impl SkySampling {
     /// All methods with their names, as scene files spell them.
-    pub const NAMES: [(&'static str, SkySampling); 4] = [
+    pub const NAMES: [(&'static str, SkySampling); 5] = [
         ("product", SkySampling::Product),
+        ("product-cells", SkySampling::ProductCells),
         ("compensated", SkySampling::Compensated),
         ("table", SkySampling::Table),
         ("cosine", SkySampling::Cosine),
@@ -32,12 +36,18 @@ impl SkySampling {
     pub const fn doc(self) -> &'static str {
         match self {
             SkySampling::Product => "by luminance times what the surface makes of it",
+            SkySampling::ProductCells => "the same, evenly within cells, and half of the samples for suns",
             SkySampling::Compensated => {
                 "by the luminance above the average; the rest is left to BSDF sampling"
             }
             SkySampling::Table => "by luminance",
             SkySampling::Cosine => "by the cosine at the receiver, whatever the sky shows",
         }
+    }
+
+    /// Whether surfaces are taken into account.
+    pub fn is_product(self) -> bool {
+        matches!(self, SkySampling::Product | SkySampling::ProductCells)
     }
 }
 

@@ -262,7 +262,7 @@ pub(super) fn plan(sky: &dyn Skybox, levels: &[Level], sampling: SkySampling) ->
         // MIS compensation: what the average level brings, the cosine lobe finds as well (Karlik et al., "MIS
         // Compensation: Optimizing Sampling Techniques in Multiple Importance Sampling", 2019, 4.3).
         SkySampling::Compensated => map_total / ordered_sum(n, |i| finest.solid_angle[i]),
-        SkySampling::Product | SkySampling::Table | SkySampling::Cosine => 0.0,
+        _ => 0.0,
     };
     let trial = levels.iter().find(|l| l.grid.cells() <= TRIAL_CELLS).or(levels.last()).unwrap_or(finest);
     let nothing = Plan { table: None, map_share: 0.0, disc_shares: discs.shares(0.0), map_total };

@@ -149,18 +149,19 @@ fn width_of(alpha: f32) -> usize {
 }
 
 impl ProductTable {
-    /// Of a sky as it is turned; None if it is black. The discs are as bright as `intensity` makes them.
+    /// Of a sky as it is turned; None if it is black. The discs are as bright as `intensity` makes them. `is_fine`: whether
+    /// cells have halves, and a lone sun less than half of several samples.
     pub fn new(
         sky: &dyn Skybox,
         level: &Level,
         discs: &[PlacedDisc],
-        turn: Option<Turn>,
-        intensity: f32,
+        (turn, intensity): (Option<Turn>, f32),
+        is_fine: bool,
     ) -> Option<Self> {
         if discs.len() > MOST_DISCS {
             return None;
         }
-        let partition = Partition::new(level, MOST_CELLS - discs.len());
+        let partition = Partition::new(level, MOST_CELLS - discs.len(), is_fine);
         let lights = partition.lights(sky, level);
         // Integrals of the map are without the intensity.
         let flux_of = |d: &PlacedDisc| {
@@ -194,7 +195,7 @@ impl ProductTable {
         let peaks: Vec<usize> = all.enumerate().filter(|(_, bright)| *bright).map(|(i, _)| i).collect();
         let middle =
             peaks.iter().map(|&i| places[i] * f64::from(cells.flux[i])).sum::<DVec3>().normalize_or_zero();
-        let is_one_peak = peaks.iter().all(|&i| places[i].dot(middle) > TOGETHER);
+        let is_one_peak = is_fine && peaks.iter().all(|&i| places[i].dot(middle) > TOGETHER);
         let tables = std::array::from_fn(|_| Tables::new());
         Some(ProductTable {
             partition,

@@ -13,8 +13,13 @@ use crate::testing::{integrate_rect, integrate_sphere};
 use charts::{Charts, chi_square_charts};
 use std::f64::consts::TAU;
 
-const METHODS: [SkySampling; 4] =
-    [SkySampling::Product, SkySampling::Compensated, SkySampling::Table, SkySampling::Cosine];
+const METHODS: [SkySampling; 5] = [
+    SkySampling::Product,
+    SkySampling::ProductCells,
+    SkySampling::Compensated,
+    SkySampling::Table,
+    SkySampling::Cosine,
+];
 
 fn anywhere() -> Receiver {
     Receiver { p: Vec3::ZERO, ng: Vec3::ZERO, ns: Vec3::ZERO }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use std::collections::BinaryHeap;
 
 /// Most halves of all cells together. A star takes ten or so.
-const MOST: usize = 1 << 15;
+pub(super) const MOST_HALVES: usize = 1 << 15;
 /// What varies by less is drawn from evenly: its relative variance, a tenth of that of a surface half in the shade. (Halves
 /// of all cells took a fifth of a render's time for a tenth less squared error, under a photographed sky.)
 const RAGGED: f64 = 0.1;
@@ -39,7 +39,8 @@ pub(super) struct Inner {
 }
 
 impl Inner {
-    pub fn new(level: &Level, cells: &[Rect]) -> Self {
+    /// With so many halves at most.
+    pub fn new(level: &Level, cells: &[Rect], most: usize) -> Self {
         let sums: Vec<Sums> = cells.par_iter().map(|r| r.sums(level)).collect();
         let total: f64 = sums.iter().map(|s| s.flux).sum();
         let candidate = |(node, (sums, rect)): (u32, (&Sums, &Rect))| {
@@ -51,7 +52,7 @@ impl Inner {
             (0..).zip(sums.iter().zip(cells)).filter_map(candidate).collect();
         let mut forks = vec![LEAF; cells.len()];
         let mut parts: Vec<(Rect, f64)> = cells.iter().map(|&rect| (rect, 1.0)).collect();
-        while forks.len() < cells.len() + MOST {
+        while forks.len() < cells.len() + most {
             let Some(c) = heap.pop() else { break };
             let Some(halves) = c.rect.halve(level, 0.0) else { continue };
             let next = forks.len() as u32;

@@ -4,7 +4,7 @@
 //! the one that adds most to the variance first, until there are as many as a table holds.
 
 use super::super::plan::Level;
-use super::inner::Inner;
+use super::inner::{Inner, MOST_HALVES};
 use crate::base::skybox::{ChartGrid, ChartPoint, Skybox};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -270,7 +270,7 @@ pub(in super::super) struct CellLight {
 
 impl Partition {
     /// Into `most` cells, or as many as it takes until each is one of the grid's.
-    pub fn new(level: &Level, most: usize) -> Self {
+    pub fn new(level: &Level, most: usize, has_halves: bool) -> Self {
         let grid = level.grid();
         let [across, down] = if grid.count == 1 { SPHERE_BLOCKS } else { FACE_BLOCKS };
         let (across, down) = (across.min(grid.width) as usize, down.min(grid.height) as usize);
@@ -310,7 +310,7 @@ impl Partition {
                 cells.push(rect);
             }
         }
-        let inner = Inner::new(level, &cells);
+        let inner = Inner::new(level, &cells, if has_halves { MOST_HALVES } else { 0 });
         let patch = |(i, rect)| Patch { is_divided: inner.is_divided(i), ..Patch::new(rect, &grid) };
         let patches = cells.iter().enumerate().map(patch).collect();
         Partition { grid, across, down, nodes, cells, patches, scale: Scale::new(&grid), inner }
