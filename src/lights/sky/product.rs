@@ -222,7 +222,7 @@ impl ProductTable {
     #[inline]
     pub fn prepare(&self, at: &Receiver, lobes: &Lobes, guide: &mut Guide) -> bool {
         let s = &lobes.scattering;
-        let first = Set::of(lobes).number() * KINDS;
+        let first = self.set_of(lobes).number() * KINDS;
         let number = |kind: usize, which: usize| ((first + kind) * OF_KIND + which) as u32;
         let even = number(0, if at.ns == Vec3::ZERO { ALL_ROUND } else { octahedron::find(at.ns) });
         if s.facets <= 0.0 || at.ns == Vec3::ZERO {
@@ -244,6 +244,15 @@ impl ProductTable {
         guide.shares = [of_even[0] / sum, of_facets[0] / sum];
         guide.worth = worth(sum, of_even[1] + of_facets[1]);
         sum > 0.0 && sum.is_finite()
+    }
+
+    /// Sets that would have the same tables are one.
+    #[inline]
+    fn set_of(&self, lobes: &Lobes) -> Set {
+        match Set::of(lobes) {
+            Set::Alone(_) if self.peaks.is_empty() || !self.is_one_peak => Set::Alone(1),
+            set => set,
+        }
     }
 
     /// The table of a number; None if all is black there. After the first time, two loads.

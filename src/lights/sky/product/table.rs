@@ -146,6 +146,21 @@ struct Piece {
     weight: f64,
 }
 
+/// A number that orders cells by place as [`f32::total_cmp`] does, those of one place by number: sorting whole numbers takes
+/// no branch.
+fn key(at: f32, cell: u16) -> u64 {
+    let bits = at.to_bits();
+    let ordered = if bits >> 31 == 1 { !bits } else { bits | 1 << 31 };
+    (u64::from(ordered) << 16) | u64::from(cell)
+}
+
+/// Cells by place.
+fn ordered(cells: impl Iterator<Item = u16>, at: impl Fn(u16) -> f32) -> Vec<u16> {
+    let mut keys: Vec<u64> = cells.map(|cell| key(at(cell), cell)).collect();
+    keys.sort_unstable();
+    keys.into_iter().map(|key| key as u16).collect()
+}
+
 /// Cuts the cells, in this order, into rows of equal weight.
 fn rows(order: &[u16], weights: &[f32]) -> Option<[Vec<Piece>; ROWS]> {
     let total: f64 = order.iter().map(|&i| f64::from(weights[i as usize])).sum();
@@ -190,19 +205,13 @@ fn quantise(pieces: &[Piece], mut put: impl FnMut(u16, i16)) {
 impl Table {
     /// Of cells, at most [`MOST_CELLS`], with weights that are not negative. None if all weights are zero.
     pub fn new(weights: &[f32], places: &[Place]) -> Option<Box<Self>> {
-        let along = |axis: usize| {
-            move |a: &u16, b: &u16| {
-                let place = |i: &u16| places[*i as usize].at[axis];
-                place(a).total_cmp(&place(b)).then(a.cmp(b))
-            }
-        };
-        let mut order: Vec<u16> = (0..weights.len() as u16).filter(|i| weights[*i as usize] > 0.0).collect();
-        order.sort_unstable_by(along(1));
+        let lit = (0..weights.len() as u16).filter(|i| weights[*i as usize] > 0.0);
+        let order = ordered(lit, |i| places[i as usize].at[1]);
         let mut rows = rows(&order, weights)?;
         let mut firsts = [0; ROWS * PARTS];
         let (mut ends, mut cells, mut units) = (Vec::new(), Vec::new(), vec![0u32; weights.len()]);
         for (firsts, row) in firsts.chunks_exact_mut(PARTS).zip(&mut rows) {
-            row.sort_unstable_by(|a, b| along(0)(&a.cell, &b.cell));
+            row.sort_unstable_by_key(|p| key(places[p.cell as usize].at[0], p.cell));
             ends.push(0);
             let start = ends.len();
             let mut last = 0;
