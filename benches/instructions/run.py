@@ -118,7 +118,7 @@ class Counter:
         with open(path("scene.toml"), "w") as out:
             out.write(text)
         words = [self.program, "render", path("scene.toml"), "-o", path("out.exr"), "--stats", path("stats.json"),
-                 "--size", f"{size[0]}x{size[1]}", "--spp", str(spp), "--seed", "1", "--backend", "bvh",
+                 "--size", f"{size[0]}x{size[1]}", "--spp", str(spp), "--seed", "1", "--dealing", "even", "--backend", "bvh",
                  "--threads", "1", "--quiet", *flags]
         valgrind = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null"]
         done = subprocess.run(valgrind + words, env={**os.environ, "SKYLIT_SIMD": "avx2"},
