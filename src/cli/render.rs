@@ -73,7 +73,7 @@ struct SamplingArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_OUTLINES)))]
     outlines: Option<u32>,
     /// Which pixels the samples go to, where --spp says how many there are on average: those that need them, or all as many
-    /// [default: by-need, from 8 samples on]
+    /// [default: by-need; even below 4 samples, and where --time, a target, --denoise or --aov variance take two sets of points]
     #[arg(long, value_name = "by-need|even")]
     dealing: Option<Dealing>,
     /// Seed of every random choice [default: 0]

@@ -123,6 +123,7 @@ pub struct Record {
     spp: u32,
     seed: u64,
     sampler: &'static str,
+    dealing: &'static str,
     filter: &'static str,
     scene: Contents,
     /// Filled in stage by stage.
@@ -158,7 +159,8 @@ impl Record {
             size: settings.size,
             spp: if settings.deals() { settings.spp } else { stats.spp },
             seed: settings.seed,
-            sampler: settings.sampler.name(),
+            sampler: settings.points().kind().name(),
+            dealing: if settings.deals() { "by-need" } else { "even" },
             filter: settings.filter.name(),
             scene: Contents::new(&scene.report, scene.lights.list.len()),
             seconds: Seconds {
@@ -216,6 +218,7 @@ impl Record {
             pair("spp", self.spp.to_string()),
             pair("seed", self.seed.to_string()),
             pair("sampler", self.sampler.to_owned()),
+            pair("dealing", self.dealing.to_owned()),
             pair("filter", self.filter.to_owned()),
             pair("chosen", self.decided.clone()),
         ];

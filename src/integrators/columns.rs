@@ -17,7 +17,7 @@ use crate::sampler::{Dim, Slot, ray_key};
 impl Block<'_> {
     /// Whether points that are alike may go on by columns: nothing is asked of each but where its path goes on.
     pub(super) fn goes_by_columns(&self) -> bool {
-        self.guided.is_none() && !self.samples_lights
+        !self.samples_lights
     }
 }
 

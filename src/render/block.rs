@@ -1,6 +1,5 @@
 //! The unit of work of a thread: a tile of pixels, its samples dealt out in batches of camera rays.
 
-use super::adaptive::Task;
 use super::backdrop::Backdrop;
 use super::coverage::Coverage;
 use super::dealing::{Counts, Kind, Note, Spent};
@@ -118,15 +117,6 @@ impl<'a> Job<'a> {
     }
 }
 
-impl Job<'_> {
-    /// Samples that a task brings, outlines counted as others.
-    pub fn samples_of(&self, task: &Task) -> u64 {
-        let Range { start, end } = task.samples;
-        let of = |(x, y)| u64::from(self.counts.map_or(end, |c| end.min(c.of(x, y))).saturating_sub(start));
-        task.rect.pixels().map(of).sum()
-    }
-}
-
 /// Indices of replicate `r` of `of` among the samples `range` of a pixel: sample s is number s / of of replicate s mod of.
 pub fn replicate_indices(range: &Range<u32>, r: u32, of: u32) -> Range<u32> {
     let first = |s: u32| if r < of { s.saturating_sub(r).div_ceil(of) } else { 0 };
@@ -214,7 +204,7 @@ impl Worker {
             self.batch.times = pixels.times();
             for (x, y) in rect.pixels().filter(|&(x, y)| pixels.contains(x, y)) {
                 let indices = indices(&range, [x, y], job, replicates)
-                    .map(|i| i.start * pixels.times()..i.end.saturating_mul(pixels.times()));
+                    .map(|i| i.start.saturating_mul(pixels.times())..i.end.saturating_mul(pixels.times()));
                 self.add_pixel(job, &points, [x, y], &indices);
             }
             self.flush(job);

@@ -5,11 +5,12 @@
 //! So the film is coloured like a chessboard: what white pixels need is read off the black ones around them, and what black
 //! ones need off the white. Points of different pixels are independent where samples are dealt by need, hence numbers and
 //! samples of a pixel are, and its mean is unbiased (but for what the two mean costs of a sample, which are counted over the
-//! whole film, know of one pixel). Totals are powers of two, of one sequence of points from the first sample to the last.
+//! whole film, know of one pixel: of the order of one over the number of pixels). Totals are powers of two, of one sequence of points from the first sample to the last.
 //!
 //! Tried: a quarter of the samples first (what no neighbour foretells, a twig or a far lamp, costs more than is gained); all
 //! twelve neighbours alike (up to 1.2 times the error); the four nearest alone (8 times under the stars of `nebula`).
 
+use super::fixed::VALUE_LIMIT;
 use super::outlines::Outlines;
 use crate::base::pixel_rect::PixelRect;
 use crate::color::Rgb;
@@ -18,7 +19,7 @@ use rayon::prelude::*;
 
 /// Samples a pixel below which all get the same: half of fewer have no spread.
 pub const LEAST_SPP: u32 = 4;
-/// Part of all samples that every pixel gets first: one in so many. Of four, what no neighbour foretells is too dear.
+/// Part of all samples that every pixel gets first: one in so many.
 const FIRST: u32 = 2;
 /// Most samples of a pixel for one of the mean, as a power of two.
 const MOST_LOG2: u32 = 4;
@@ -55,9 +56,14 @@ const DOUBLINGS: f64 = 128.0;
 /// Bytes for each pixel of the film: what it showed, what its neighbours say, and its number.
 pub const BYTES_PER_PIXEL: u64 = (size_of::<Note>() + size_of::<Guess>() + size_of::<u32>()) as u64;
 
-/// The samples that every pixel gets first, a power of two.
+/// The samples that every pixel gets first: the power of two that is next to half of all, in doublings.
 pub fn first_samples(spp: u32) -> u32 {
-    1 << (spp / FIRST).max(1).ilog2()
+    even_samples(spp) / FIRST
+}
+
+/// The power of two next to `spp`, in doublings.
+fn even_samples(spp: u32) -> u32 {
+    1 << f64::from(spp.max(FIRST)).log2().round().min(31.0) as u32
 }
 
 /// What kind of pixel; neighbours of other kinds say little of it.
@@ -95,8 +101,14 @@ impl Note {
     pub fn of(li: &[Rgb], alpha: &[f32], kind: Kind) -> Self {
         let n = li.len().max(1);
         let group = 1usize << (n.ilog2() / 2);
-        let luminance = |c: &Rgb| if c.is_finite() { f64::from(c.luminance()) } else { 0.0 };
-        let means = li.chunks(group).map(|g| g.iter().map(luminance).sum::<f64>() / g.len() as f64);
+        // As the film takes them: what is no number is left out, what is too large is cut.
+        let luminance = |c: &Rgb| f64::from(c.luminance().min(VALUE_LIMIT));
+        let mean_of = |g: &[Rgb]| {
+            let (sum, n) =
+                g.iter().filter(|c| c.is_finite()).fold((0.0, 0.0), |(s, n), c| (s + luminance(c), n + 1.0));
+            (n > 0.0).then(|| sum / n)
+        };
+        let means = li.chunks(group).filter_map(mean_of);
         let (mut sum, mut squares, mut groups) = (0.0, 0.0, 0.0);
         for m in means {
             (sum, squares, groups) = (sum + m, squares + m * m, groups + 1.0);
@@ -152,6 +164,14 @@ impl Counts {
         self.list[self.rect.index(x, y)]
     }
 
+    /// Of a pixel, with what stands for samples where nothing is traced.
+    pub fn with_bare(&self, x: u32, y: u32) -> u32 {
+        match self.of(x, y) {
+            0 => self.bare,
+            n => n,
+        }
+    }
+
     /// The fewest, the mean and the most.
     pub fn range(&self) -> (u32, f64, u32) {
         let all = || self.list.iter().map(|&n| if n == 0 { self.bare } else { n });
@@ -191,7 +211,8 @@ impl Notes {
         let plain = self.cost(Kind::Plain, &self.spent.plain, 1);
         let costs = [plain, self.cost(Kind::Outline, &self.spent.outlines, times)];
         let means = [0, 1].map(|colour| self.mean_of(1 - colour));
-        let dealer = Dealer { first, spp, most: (spp.ilog2() + MOST_LOG2).min(u32::BITS - 1) };
+        let most = (spp.ilog2() + MOST_LOG2).min(u32::BITS - 1);
+        let dealer = Dealer { first, spp, most, times: f64::from(times) };
         let width = self.rect.width() as usize;
         let place = |at: usize| (self.rect.x0 + (at % width) as u32, self.rect.y0 + (at / width) as u32);
         let guess = |at: usize| {
@@ -227,15 +248,19 @@ impl Notes {
     fn guess(&self, x: u32, y: u32, mean: f64, costs: [f64; 2], dealer: &Dealer) -> Guess {
         let own = self.list[self.rect.index(x, y)].kind;
         // What an outline hides, its neighbours do not show.
-        let (hit, least) = match own {
+        let (hit, times, least) = match own {
             Kind::Bare => return Guess { share: 0.0, cost: 0.0, least: 0 },
-            Kind::Plain => (costs[0], dealer.first),
-            Kind::Outline => (costs[1], 1 << dealer.spp.ilog2()),
+            Kind::Plain => (costs[0], 1.0, dealer.first),
+            Kind::Outline => (costs[1], dealer.times, even_samples(dealer.spp)),
         };
         let [n, luminance, variance, alpha] = self.around(x, y, own);
+        if n == 0.0 {
+            return Guess { share: f64::NEG_INFINITY, cost: hit, least: even_samples(dealer.spp) };
+        }
         let scale = (luminance / n).powi(2) + EPSILON * mean * mean;
-        let error = if variance > 0.0 { variance / n / scale } else { 0.0 };
-        let cost = BARE_COST + if n > 0.0 { alpha / n } else { 1.0 } * hit;
+        // Of one sample, which of an outline is several.
+        let error = if variance > 0.0 { variance / n / scale / times } else { 0.0 };
+        let cost = (1.0 - alpha / n).max(0.0) * BARE_COST * times + alpha / n * hit;
         Guess { share: POWER * (error / cost).log2(), cost, least }
     }
 
@@ -274,6 +299,8 @@ struct Dealer {
     spp: u32,
     /// The binary logarithm of the most.
     most: u32,
+    /// Camera rays of a sample of an outline.
+    times: f64,
 }
 
 impl Dealer {
@@ -285,17 +312,21 @@ impl Dealer {
         (1u32 << share.round().clamp(0.0, f64::from(self.most)) as u32).max(least)
     }
 
-    /// What is to be added to shares so that samples cost what `spp` of each would, or hardly less.
+    /// What is to be added to shares so that samples cost what `spp` of each would; less where no noise was seen.
     fn scale<'a>(&self, guesses: impl Iterator<Item = &'a Guess>) -> f64 {
         // Costs by share, for either of two floors.
         let mut histogram = vec![[0.0; 2]; (DOUBLINGS * STEPS) as usize];
         let (mut budget, last) = (0.0, histogram.len() as f64 - 1.0);
         for g in guesses.filter(|g| g.least > 0) {
             budget += g.cost * f64::from(self.spp);
+            if g.share == f64::NEG_INFINITY {
+                budget -= g.cost * f64::from(g.least);
+                continue;
+            }
             let at = ((g.share + 0.5 * DOUBLINGS) * STEPS).clamp(0.0, last) as usize;
             histogram[at][usize::from(g.least > self.first)] += g.cost;
         }
-        let floors = [self.first, 1 << self.spp.ilog2()];
+        let floors = [self.first, even_samples(self.spp)];
         let bins: Vec<(f64, [f64; 2])> = (histogram.iter().enumerate())
             .filter(|(_, costs)| costs[0] + costs[1] > 0.0)
             .map(|(at, costs)| ((at as f64 + 0.5) / STEPS - 0.5 * DOUBLINGS, *costs))

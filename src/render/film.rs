@@ -1,8 +1,9 @@
 //! The film: exact sums of filtered samples (see [`super::fixed`] for step and ranges), with what later error
 //! estimates need: two half-buffers a pixel, and per tile the luminance of a few independent replicates.
 //!
-//! A pixel takes 36 bytes, or 64 where both halves have samples. Threads accumulate into a [`FilmTile`] of their own, without locks, and add it to
-//! the [`Film`] when it is done; as only integers are added, the order in which that happens leaves no trace.
+//! A pixel takes 36 bytes, or 64 where both halves have samples. Threads accumulate into a [`FilmTile`] of their own,
+//! without locks, and add it to the [`Film`] when it is done; as only integers are added, the order in which that happens
+//! leaves no trace.
 
 mod store;
 mod tile;

@@ -93,7 +93,7 @@ pub struct RenderStats {
     pub samples: u64,
     /// Rays by kind.
     pub rays: RayCounts,
-    /// Samples that were not finite and were left black.
+    /// Samples that were not finite and were left out.
     pub dropped: u64,
     /// The first few of them.
     pub bad: Vec<BadSample>,
@@ -111,6 +111,23 @@ pub struct RenderStats {
     pub avoided: Avoided,
     /// Rays that were spent on deciding; among `rays`.
     pub pilot: RayCounts,
+}
+
+impl RenderStats {
+    /// What pixels have after a part of the samples, of which some tiles are done.
+    fn tell(&mut self, tiles: &[PixelRect], done: &[Option<u64>], number: impl Fn(u32, u32, bool) -> u32) {
+        (self.spp_least, self.spp) = (u32::MAX, 0);
+        let (mut sum, mut pixels) = (0, 0);
+        for (rect, done) in tiles.iter().zip(done) {
+            for (x, y) in rect.pixels() {
+                let n = number(x, y, done.is_some());
+                (self.spp_least, self.spp) = (self.spp_least.min(n), self.spp.max(n));
+                (sum, pixels) = (sum + u64::from(n), pixels + 1);
+            }
+        }
+        self.spp_mean = sum as f64 / f64::from(pixels.max(1));
+        self.interrupted = done.contains(&None);
+    }
 }
 
 /// Decides how a scene is traced.
@@ -262,18 +279,16 @@ fn dealt(job: &Job, workers: &Mutex<Vec<Worker>>, out: &mut Rendered, progress: 
     let noting = Job { notes: true, ..*job };
     let done = render_round(&noting, &tasks(0..first), workers, out, Some(&mut notes), progress)?;
     out.stats.rounds = 1;
-    out.stats.interrupted = done.contains(&None);
-    (out.stats.spp_least, out.stats.spp_mean, out.stats.spp) = (first, f64::from(first), first);
+    out.stats.tell(&tiles, &done, |_, _, is_done| if is_done { first } else { 0 });
     if out.stats.interrupted {
         return Ok(());
     }
     let counts = notes.deal(first, spp, job.outlines.map(|o| o.pixels));
     drop(notes);
-    (out.stats.spp_least, out.stats.spp_mean, out.stats.spp) = counts.range();
     let rest = Job { counts: Some(&counts), ..*job };
-    let done = render_round(&rest, &tasks(first..out.stats.spp), workers, out, None, progress)?;
+    let done = render_round(&rest, &tasks(first..counts.range().2), workers, out, None, progress)?;
     out.stats.rounds = 2;
-    out.stats.interrupted = done.contains(&None);
+    out.stats.tell(&tiles, &done, |x, y, is_done| if is_done { counts.with_bare(x, y) } else { first });
     Ok(())
 }
 
@@ -307,7 +322,9 @@ fn render_round(
         }
         drop(sums);
         lock(workers).push(worker);
-        progress.advance(job.samples_of(task));
+        // Where samples are dealt by need, a tile counts as if they were not: the sum is known beforehand.
+        let end = if job.counts.is_some() { job.settings.spp } else { task.samples.end };
+        progress.advance(task.rect.area() as u64 * u64::from(end.saturating_sub(task.samples.start)));
         Ok(Some(rays))
     };
     tasks.par_iter().with_max_len(1).map(run).collect()

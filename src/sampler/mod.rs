@@ -74,6 +74,11 @@ pub struct PointSet {
 }
 
 impl PointSet {
+    /// Their kind.
+    pub fn kind(&self) -> Sampler {
+        self.kind
+    }
+
     /// Those of pixel (x, y). Another `replicate` gives an independent randomisation of the same pixel: the variance
     /// between replicates is an unbiased estimate of that of the mean of one.
     pub fn pixel(&self, x: u32, y: u32, replicate: u32) -> PixelSampler {

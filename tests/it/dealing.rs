@@ -80,14 +80,14 @@ fn the_same_rays_leave_less_error() {
         (error, rays)
     };
     let ((needed, needed_rays), (even, even_rays)) = (mean(true), mean(false));
-    // Numbers are powers of two, so that what is spent comes out near to what was asked for.
-    assert!(needed_rays < 1.1 * even_rays, "{needed_rays} {even_rays}");
-    // Eight renders tell either error to some 10 %.
+    // What is spent is what was asked for but for bare samples, which have none of these rays, and outlines, which may have more.
+    assert!((0.85..1.1).contains(&(needed_rays / even_rays)), "{needed_rays} {even_rays}");
+    // 0.6 to 0.7 on the scenes of benches/README.md with metal; eight renders tell either error to some 10 %.
     assert!(needed < 0.85 * even, "{needed} {even}");
 }
 
 #[test]
-fn numbers_follow_from_the_scene_alone() {
+fn numbers_depend_on_no_thread() {
     let bench = Bench::new();
     let [one, two] = [1, 2].map(|threads| bench.render(|s| s.threads = threads));
     assert!(one.stats.spp_least < 16 && one.stats.spp > 16, "{} {}", one.stats.spp_least, one.stats.spp);

@@ -218,7 +218,8 @@ pub(super) fn camera_rays(scene: &Scene, count: usize) -> Vec<RayBatch> {
     let pixels = size[0] as usize * size[1] as usize;
     // A small picture has more samples a pixel instead.
     let spp = count.div_ceil(pixels).next_multiple_of(2).max(SPP as usize) as u32;
-    let settings = RenderSettings { spp, threads: 1, seed: SEED, ..RenderSettings::new(size) };
+    let settings =
+        RenderSettings { spp, threads: 1, seed: SEED, by_need: false, ..RenderSettings::new(size) };
     let tiles: Vec<_> = Film::new(size[0], size[1], settings.crop).tiles().collect();
     let of_whole_tiles = count.div_ceil(16 * 16 * spp as usize);
     // Few rays are parts of more tiles: a handful of whole ones could all miss.

@@ -282,7 +282,7 @@ impl ProductTable {
         if set != Some(Set::Helped) {
             weights.iter_mut().zip(&cells.flux).for_each(|(w, flux)| *w *= flux);
             if let Some(Set::Alone(bits)) = set {
-                self.limit_peaks(if self.is_one_peak { bits } else { 1 }, &mut weights);
+                self.limit_peaks(bits, &mut weights);
             }
         } else {
             let (flux, angle) = (sum(&cells.flux), sum(&cells.angle));

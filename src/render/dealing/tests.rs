@@ -74,9 +74,14 @@ fn numbers_go_by_noise_and_cost() {
             .map(|l| l - f64::from(counts.of(20, 20)).log2()),
         [0.0, 2.0]
     );
-    // The same noise of a pixel 2^1.25 times as dark counts 2^2.5 times as much: to the power 0.4 that is twice.
-    let counts = notes(|x, _| plain(if x < 40 { 1.25f32.exp2() } else { 1.0 }, 1.0)).deal(8, 32, None);
-    assert_eq!(counts.of(60, 20), 2 * counts.of(20, 20));
+    // The same noise of a pixel 2^1.25 times as dark counts 2^2.5 times as much: to the power 0.4 that is twice, or 1 % less
+    // by what is added to dark pixels' squares, which rounding to powers of two shows in one of a hundred cases.
+    let dark = notes(|x, _| plain(if x < 40 { 1.25f32.exp2() } else { 1.0 }, 1.0));
+    let is_twice = |spp: &u32| {
+        let counts = dark.deal(8, *spp, None);
+        counts.of(60, 20) == 2 * counts.of(20, 20)
+    };
+    assert!((17..48).filter(is_twice).count() > 28);
     // Samples that mostly meet nothing are cheap.
     let half = |x: u32| if x < 40 { 1.0 } else { 0.01 };
     let counts = notes(|x, _| Note { alpha: half(x), ..plain(1.0, 1.0) }).deal(8, 32, None);
@@ -113,7 +118,6 @@ fn a_note_tells_the_spread_of_what_stratification_leaves() {
         .sum::<f64>()
         / 2000.0;
     assert!((mean * 12.0 - 1.0).abs() < 0.08, "{mean}");
-    assert_eq!(of(&[f32::NAN, 1.0]).mean, 0.5, "what is no number is left black, as in the film");
-    assert_eq!(first_samples(4), 2);
-    assert_eq!(first_samples(100), 32);
+    assert_eq!(of(&[f32::NAN, 1.0]).mean, 1.0, "what is no number is left out, as in the film");
+    assert_eq!([4, 7, 15, 63, 64, 100].map(first_samples), [2, 4, 8, 32, 32, 64]);
 }
