@@ -72,7 +72,7 @@ struct SamplingArgs {
     /// Samples of pixels that outlines run through, at most, for each of another's (1: as many) [default: 4]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_OUTLINES)))]
     outlines: Option<u32>,
-    /// Which pixels the samples go to, where --spp says how many there are on average: those that need them, or all as many
+    /// Which pixels the samples go to: those that need them, for what --spp samples of each would cost, or all as many
     /// [default: by-need; even below 4 samples, and where --time, a target, --denoise or --aov variance take two sets of points]
     #[arg(long, value_name = "by-need|even")]
     dealing: Option<Dealing>,

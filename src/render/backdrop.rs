@@ -1,8 +1,9 @@
 //! Pixels that see nothing but what is behind everything: their filter's integral of it, instead of samples.
 //!
 //! A sky that is the same everywhere is what it is, and one without detail takes a few points a tile (`smooth`). Any other
-//! sky, and tiles that a sun or a horizon runs through, are looked up on a grid of 4 x 4 points a pixel, which neighbours share, and the filter laid over it one axis
-//! after the other: up to 144 points count for a pixel, of which it pays for 16 to 23. Half of the points make an estimate
+//! sky, and tiles that a sun or a horizon runs through, are looked up on a grid of 4 x 4 points a pixel, which neighbours
+//! share, and the filter laid over it one axis after the other: up to 144 points count for a pixel, of which it pays for
+//! 16 to 23. Half of the points make an estimate
 //! by themselves and the other half another, in three ways: by rows, by columns and by fields, of which those at the ends
 //! of every four are one half and those between the other, so that a mere slope divides evenly. Where halves differ by too
 //! much (the rim of a sun, stars, texels as large as pixels that differ wildly) the pixel is sampled as others are. One way

@@ -5,7 +5,8 @@
 //! So the film is coloured like a chessboard: what white pixels need is read off the black ones around them, and what black
 //! ones need off the white. Points of different pixels are independent where samples are dealt by need, hence numbers and
 //! samples of a pixel are, and its mean is unbiased (but for what the two mean costs of a sample, which are counted over the
-//! whole film, know of one pixel: of the order of one over the number of pixels). Totals are powers of two, of one sequence of points from the first sample to the last.
+//! whole film, know of one pixel: of the order of one over the number of pixels). Totals are powers of two, of one sequence
+//! of points from the first sample to the last.
 //!
 //! Tried: a quarter of the samples first (what no neighbour foretells, a twig or a far lamp, costs more than is gained); all
 //! twelve neighbours alike (up to 1.2 times the error); the four nearest alone (8 times under the stars of `nebula`).
@@ -21,7 +22,7 @@ use rayon::prelude::*;
 pub const LEAST_SPP: u32 = 4;
 /// Part of all samples that every pixel gets first: one in so many.
 const FIRST: u32 = 2;
-/// Most samples of a pixel for one of the mean, as a power of two.
+/// Most samples of a pixel for each of `spp`, as a power of two.
 const MOST_LOG2: u32 = 4;
 /// Part of the squared mean that is added to a pixel's own, as in relMSE: what a dark pixel counts for.
 const EPSILON: f64 = 0.01;
@@ -172,11 +173,9 @@ impl Counts {
         }
     }
 
-    /// The fewest, the mean and the most.
-    pub fn range(&self) -> (u32, f64, u32) {
-        let all = || self.list.iter().map(|&n| if n == 0 { self.bare } else { n });
-        let mean = all().map(f64::from).sum::<f64>() / self.list.len().max(1) as f64;
-        (all().min().unwrap_or(0), mean, all().max().unwrap_or(0))
+    /// The most of all that are traced.
+    pub fn most(&self) -> u32 {
+        self.list.iter().copied().max().unwrap_or(0)
     }
 }
 

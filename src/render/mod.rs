@@ -286,7 +286,7 @@ fn dealt(job: &Job, workers: &Mutex<Vec<Worker>>, out: &mut Rendered, progress: 
     let counts = notes.deal(first, spp, job.outlines.map(|o| o.pixels));
     drop(notes);
     let rest = Job { counts: Some(&counts), ..*job };
-    let done = render_round(&rest, &tasks(first..counts.range().2), workers, out, None, progress)?;
+    let done = render_round(&rest, &tasks(first..counts.most().max(first)), workers, out, None, progress)?;
     out.stats.rounds = 2;
     out.stats.tell(&tiles, &done, |x, y, is_done| if is_done { counts.with_bare(x, y) } else { first });
     Ok(())

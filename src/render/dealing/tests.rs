@@ -45,7 +45,9 @@ fn all_cost_what_was_asked_for() {
     let alike = |spp: u32, variance: &dyn Fn(&mut TestRng) -> f32| {
         let mut rng = TestRng::new(u64::from(spp));
         let counts = notes(|_, _| plain(1.0, variance(&mut rng))).deal(first_samples(spp), spp, None);
-        counts.range()
+        let numbers = || RECT.pixels().map(|(x, y)| counts.of(x, y));
+        let mean = numbers().map(f64::from).sum::<f64>() / RECT.area() as f64;
+        (numbers().min().unwrap(), mean, numbers().max().unwrap())
     };
     for spp in [4, 5, 8, 16, 100, 1024] {
         // Where pixels want their shares of what is left, numbers are powers of two, as the sum comes out. By far the most
