@@ -30,6 +30,9 @@ const CANDIDATES: usize = 4;
 const MOST: usize = 384;
 /// Fewer say nothing.
 const LEAST: usize = 24;
+/// Fewer that a render affords are not worth what is made for their sake, whatever comes of it: tables of the sky for
+/// hundreds of directions, for each strategy others.
+const WORTHWHILE: usize = 192;
 /// Most part of a render's samples that is spent on trying.
 const SHARE: f64 = 0.02;
 /// Most camera rays that look for materials.
@@ -155,14 +158,14 @@ pub(super) fn choose(tracer: &PathTracer, scene: &Scene, plan: &PilotPlan) -> Op
     }
     let most = (affordable / classes.list.len().max(1)).min(MOST);
     let mut bare = Bare::default();
-    if affordable >= LEAST && !plan.by_need {
+    if affordable >= WORTHWHILE && !plan.by_need {
         let most = affordable.min(MOST);
         bare.add(tracer, scene, plan, (&classes.bare, most), 1);
         bare.add(tracer, scene, plan, (&classes.outlined, most), plan.outline_times);
     }
     rays.add(&bare.rays);
     for class in classes.list.iter_mut().filter(|c| !c.material.is_delta() && !c.material.is_black()) {
-        if class.pixels.len().min(most) < LEAST {
+        if affordable < WORTHWHILE || class.pixels.len().min(most) < LEAST {
             class.strategy = choices.usual(class.is_even);
             continue;
         }

@@ -220,12 +220,18 @@ impl Notes {
         };
         let guesses: Vec<Guess> =
             (0..self.list.len()).into_par_iter().with_min_len(1 << 12).map(guess).collect();
-        let scales = [0, 1].map(|wanted| {
+        let scale = |wanted: usize| {
             let rows = self.rect.pixels().zip(&guesses);
             dealer.scale(rows.filter(|((x, y), _)| colour(*x, *y) == wanted).map(|(_, g)| g))
-        });
-        let count = |((x, y), g): ((u32, u32), &Guess)| dealer.count(g.share + scales[colour(x, y)], g.least);
-        Counts { rect: self.rect, list: self.rect.pixels().zip(&guesses).map(count).collect(), bare: spp }
+        };
+        let (white, black) = rayon::join(|| scale(0), || scale(1));
+        let count = |at: usize| {
+            let (x, y) = place(at);
+            let g = &guesses[at];
+            dealer.count(g.share + [white, black][colour(x, y)], g.least)
+        };
+        let list = (0..guesses.len()).into_par_iter().with_min_len(1 << 12).map(count).collect();
+        Counts { rect: self.rect, list, bare: spp }
     }
 
     /// What a sample costs that meets a surface.

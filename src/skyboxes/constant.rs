@@ -2,7 +2,7 @@
 
 use super::cylinder;
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
-use crate::base::skybox::{ChartGrid, ChartPoint, Skybox};
+use crate::base::skybox::{ChartDirections, ChartGrid, ChartLanes, ChartPoint, Skybox};
 use crate::color::Rgb;
 use glam::{DVec3, Vec3};
 use std::sync::Arc;
@@ -33,6 +33,10 @@ impl Skybox for Constant {
 
     fn solid_angle_density(&self, _c: ChartPoint) -> f64 {
         cylinder::DENSITY
+    }
+
+    fn directions_and_densities(&self, at: &ChartLanes, _n: usize) -> ChartDirections {
+        at.directions(cylinder::toward)
     }
 
     fn irradiance_closed_form(&self, _n: DVec3) -> Option<Rgb> {

@@ -5,8 +5,9 @@ use super::cylinder;
 use super::dome::Dome;
 use super::number;
 use super::spectrum::{self, LANES, Spectrum};
+use crate::base::directions::Directions;
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
-use crate::base::skybox::{ChartGrid, ChartPoint, SkyDisc, Skybox};
+use crate::base::skybox::{ChartDirections, ChartGrid, ChartLanes, ChartPoint, SkyDisc, Skybox};
 use crate::color::Rgb;
 use crate::error::Result;
 use glam::{DVec3, Vec3, Vec4};
@@ -260,6 +261,10 @@ impl Skybox for Daylight {
         self.dome.radiance(d)
     }
 
+    fn radiance_batch(&self, d: Directions, out: &mut [Rgb]) {
+        self.dome.radiance_batch(d, out);
+    }
+
     fn is_smooth(&self) -> bool {
         true
     }
@@ -278,6 +283,10 @@ impl Skybox for Daylight {
 
     fn solid_angle_density(&self, _c: ChartPoint) -> f64 {
         cylinder::DENSITY
+    }
+
+    fn directions_and_densities(&self, at: &ChartLanes, _n: usize) -> ChartDirections {
+        at.directions(cylinder::toward)
     }
 
     fn discs(&self) -> &[SkyDisc] {

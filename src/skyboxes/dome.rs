@@ -1,6 +1,8 @@
 //! A smooth sky as tables: one division, one square root and four neighbours a lookup.
 
+use crate::base::directions::Directions;
 use crate::color::Rgb;
+use crate::math::simd::{self, Kernel};
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
@@ -12,50 +14,46 @@ const UP: usize = 48;
 const STRIDE: usize = ACROSS + 1;
 const SIDE_FACE: usize = STRIDE * (UP + 1);
 const TOP: usize = 4 * SIDE_FACE;
+/// All of a half.
+const HALF: usize = TOP + STRIDE * STRIDE;
+/// Lookups that are placed at once.
+const CHUNK: usize = 128;
 
 /// Radiances on a cube cut in two by the horizon, one half of it above and one below. Values stand on the edges of faces
 /// too, those on the horizon twice, so that no lookup ever leaves its face and the horizon stays sharp.
-pub(super) struct Dome([Vec<Vec4>; 2]);
+/// The upper half first.
+pub(super) struct Dome(Vec<Vec4>);
 
 impl Dome {
     /// Tabulates `f`, which is asked just above and just below the horizon for what is on it.
     pub fn new(f: impl Fn(Vec3) -> Rgb + Sync) -> Self {
-        let half = |sign: f32| {
-            let mut table = vec![Vec4::ZERO; TOP + STRIDE * STRIDE];
-            table.par_chunks_mut(STRIDE).enumerate().for_each(|(row, values)| {
-                for (i, value) in values.iter_mut().enumerate() {
-                    let c = f(direction(row, i, sign));
-                    *value = Vec4::new(c.r, c.g, c.b, 0.0);
-                }
-            });
-            table
-        };
-        Dome([half(1.0), half(-1.0)])
+        let mut table = vec![Vec4::ZERO; 2 * HALF];
+        table.par_chunks_mut(STRIDE).enumerate().for_each(|(row, values)| {
+            const ROWS: usize = HALF / STRIDE;
+            let sign = if row < ROWS { 1.0 } else { -1.0 };
+            for (i, value) in values.iter_mut().enumerate() {
+                let c = f(direction(row % ROWS, i, sign));
+                *value = Vec4::new(c.r, c.g, c.b, 0.0);
+            }
+        });
+        Dome(table)
     }
 
     /// The radiance towards `d`, not zero, of any length.
     #[inline(always)]
     pub fn radiance(&self, d: Vec3) -> Rgb {
-        let a = d.abs();
-        let middle = 0.5 * ACROSS as f32;
-        let (base, s, v, rows);
-        if a.y > a.x.max(a.z) {
-            let inv = middle / a.y;
-            (base, s, v, rows) = (TOP, d.x * inv, d.z * inv + middle, ACROSS);
-        } else {
-            let x_major = a.x >= a.z;
-            let (major, other) = if x_major { (d.x, d.z) } else { (d.z, d.x) };
-            let inv = 1.0 / major.abs();
-            let face = 2 * usize::from(!x_major) + usize::from(major < 0.0);
-            (base, s) = (face * SIDE_FACE, other * inv * middle);
-            (v, rows) = ((a.y * inv).sqrt() * UP as f32, UP);
-        }
-        let u = s + middle;
-        let (i, j) = ((u as usize).min(ACROSS - 1), (v as usize).min(rows - 1));
-        let (fu, fv) = (u - i as f32, v - j as f32);
-        let at = base + j * STRIDE + i;
-        let table = &self.0[usize::from(d.y < 0.0)];
-        let (p, q) = (&table[at..at + 2], &table[at + STRIDE..at + STRIDE + 2]);
+        self.mix(place(d.to_array()))
+    }
+
+    /// The same of many directions, bit for bit.
+    pub fn radiance_batch(&self, d: Directions, out: &mut [Rgb]) {
+        simd::dispatch(Lookups { dome: self, d, out });
+    }
+
+    #[inline(always)]
+    fn mix(&self, (at, fu, fv): (u32, f32, f32)) -> Rgb {
+        let at = at as usize;
+        let (p, q) = (&self.0[at..at + 2], &self.0[at + STRIDE..at + STRIDE + 2]);
         let (p, q) = (p[0] + (p[1] - p[0]) * fu, q[0] + (q[1] - q[0]) * fu);
         let l = p + (q - p) * fv;
         Rgb::new(l.x, l.y, l.z)
@@ -63,7 +61,56 @@ impl Dome {
 
     /// Bytes held.
     pub fn memory(&self) -> u64 {
-        self.0.iter().map(|t| (t.len() * size_of::<Vec4>()) as u64).sum()
+        size_of_val(&*self.0) as u64
+    }
+}
+
+/// The first of the four values about a direction, and how far it is on to the others. Without a branch, of which no
+/// processor could foretell where it goes.
+#[inline(always)]
+fn place([x, y, z]: [f32; 3]) -> (u32, f32, f32) {
+    let (ax, ay, az) = (x.abs(), y.abs(), z.abs());
+    let x_major = ax >= az;
+    let (major, other) = if x_major { (x, z) } else { (z, x) };
+    let is_top = ay > major.abs();
+    let inv = 1.0 / if is_top { ay } else { major.abs() };
+    let middle = 0.5 * ACROSS as f32;
+    let u = if is_top { x } else { other } * inv * middle + middle;
+    let side = (ay * inv).sqrt() * UP as f32;
+    let v = if is_top { z * inv * middle + middle } else { side };
+    let side =
+        if x_major { 0 } else { 2 * SIDE_FACE as i32 } + if major < 0.0 { SIDE_FACE as i32 } else { 0 };
+    let (base, rows) = if is_top { (TOP as i32, ACROSS as i32) } else { (side, UP as i32) };
+    let (i, j) = (u as i32, v as i32);
+    let i = if i < ACROSS as i32 { i } else { ACROSS as i32 - 1 };
+    let j = if j < rows { j } else { rows - 1 };
+    let half = if y < 0.0 { HALF as i32 } else { 0 };
+    ((half + base + j * STRIDE as i32 + i) as u32, u - i as f32, v - j as f32)
+}
+
+struct Lookups<'a> {
+    dome: &'a Dome,
+    d: Directions<'a>,
+    out: &'a mut [Rgb],
+}
+
+impl Kernel for Lookups<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let mut at = [0; CHUNK];
+        let [mut fu, mut fv] = [[0.0; CHUNK]; 2];
+        for ((_, d), out) in self.d.chunks(CHUNK).zip(self.out.chunks_mut(CHUNK)) {
+            let n = d.len().min(CHUNK);
+            let (x, y, z) = (&d.x[..n], &d.y[..n], &d.z[..n]);
+            for k in 0..n {
+                (at[k], fu[k], fv[k]) = place([x[k], y[k], z[k]]);
+            }
+            for (k, out) in out.iter_mut().take(n).enumerate() {
+                *out = self.dome.mix((at[k], fu[k], fv[k]));
+            }
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::cylinder;
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
-use crate::base::skybox::{ChartGrid, ChartPoint, Skybox};
+use crate::base::skybox::{ChartDirections, ChartGrid, ChartLanes, ChartPoint, Skybox};
 use crate::color::Rgb;
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
@@ -46,6 +46,10 @@ impl Skybox for Gradient {
 
     fn solid_angle_density(&self, _c: ChartPoint) -> f64 {
         cylinder::DENSITY
+    }
+
+    fn directions_and_densities(&self, at: &ChartLanes, _n: usize) -> ChartDirections {
+        at.directions(cylinder::toward)
     }
 
     fn irradiance_closed_form(&self, n: DVec3) -> Option<Rgb> {

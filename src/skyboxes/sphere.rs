@@ -11,7 +11,7 @@ use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::base::skybox::{ChartDirections, ChartGrid, ChartLanes, ChartPoint, Skybox};
 use crate::color::Rgb;
 use crate::math::simd;
-use crate::math::trig::{atan2_turns, sin_cos_2pi_f64};
+use crate::math::trig::{atan2_turns, atan2_turns_f64, sin_cos_2pi_f64};
 use glam::{DVec3, Vec3};
 use lookups::Lookups;
 use std::f64::consts::{PI, TAU};
@@ -115,19 +115,17 @@ impl Skybox for Sphere {
     }
 
     fn direction(&self, c: ChartPoint) -> DVec3 {
-        let (sin_a, cos_a) = ((c.u - 0.5) * TAU).sin_cos();
-        let (sin_p, cos_p) = (c.v * PI).sin_cos();
-        DVec3::new(sin_p * cos_a, cos_p, sin_p * sin_a)
+        toward(c).0
     }
 
     fn locate(&self, d: DVec3) -> ChartPoint {
-        let u = 0.5 + d.z.atan2(d.x) / TAU;
-        let v = d.x.hypot(d.z).atan2(d.y) / PI;
+        let u = 0.5 + atan2_turns_f64(d.z, d.x);
+        let v = 2.0 * atan2_turns_f64((d.x * d.x + d.z * d.z).sqrt(), d.y);
         ChartPoint { chart: 0, u, v }
     }
 
     fn solid_angle_density(&self, c: ChartPoint) -> f64 {
-        TAU * PI * (c.v * PI).sin()
+        TAU * PI * sin_cos_2pi_f64(0.5 * c.v).sin
     }
 
     fn direction_and_density(&self, c: ChartPoint) -> (DVec3, f64) {

@@ -25,6 +25,7 @@ mod choose;
 mod inner;
 mod octahedron;
 mod partition;
+mod place;
 mod table;
 mod weigh;
 
@@ -32,13 +33,13 @@ use super::placed::{PlacedDisc, Turn};
 use super::plan::Level;
 use crate::base::light::{Guide, Lobes, Receiver};
 use crate::base::skybox::{ChartPoint, Skybox};
-use crate::math::Frame;
 use crate::math::simd::dispatch;
 pub(super) use choose::Chosen;
 use glam::{DVec3, Vec3};
 use partition::Partition;
+use place::Places;
 use std::sync::OnceLock;
-use table::{FIRST_BACK, MOST_CELLS, Place, SECOND_BACK, SWAPPED, Table};
+use table::{MOST_CELLS, Table};
 use weigh::{About, Columns, Even, Facets};
 
 /// Widths of facets' lobes that have tables of their own, each sqrt(2) times the next.
@@ -73,8 +74,6 @@ pub(super) struct ProductTable {
     partition: Partition,
     /// The discs after the cells of the map.
     cells: Columns,
-    /// Of the map's cells, see [`partition::CellLight::sides`].
-    sides: Vec<[Vec3; 2]>,
     /// Cells far brighter than the mean.
     peaks: Vec<usize>,
     /// Whether they are [`TOGETHER`].
@@ -178,14 +177,15 @@ impl ProductTable {
             let least = if flux > 0.0 { f32::MIN_POSITIVE / f32::EPSILON } else { 0.0 };
             ((flux / total) as f32).max(least)
         };
-        let (mut cells, mut sides) = (Columns::default(), Vec::with_capacity(lights.len()));
+        let mut cells = Columns::default();
         for l in &lights {
-            let world = turn.map_or(l.middle, |t| t.to_world(l.middle)).as_vec3();
-            cells.push(world, l.reach, part(l.flux), l.angle as f32);
-            sides.push(l.sides.map(|s| turn.map_or(s, |t| t.to_world(s)).as_vec3()));
+            let to_world = |v: DVec3| turn.map_or(v, |t| t.to_world(v)).as_vec3();
+            let sides = l.sides.map(to_world);
+            cells.push(to_world(l.middle), sides, l.reach, part(l.flux), l.angle as f32);
         }
         for disc in discs {
-            cells.push(disc.frame.n, disc.sin, part(flux_of(disc)), std::f32::consts::TAU * disc.m);
+            let angle = std::f32::consts::TAU * disc.m;
+            cells.push(disc.frame.n, [Vec3::ZERO; 2], disc.sin, part(flux_of(disc)), angle);
         }
         let places = lights.iter().map(|l| turn.map_or(l.middle, |t| t.to_world(l.middle)));
         let places: Vec<_> = places.chain(discs.iter().map(|d| d.frame.n.as_dvec3())).collect();
@@ -197,16 +197,7 @@ impl ProductTable {
             peaks.iter().map(|&i| places[i] * f64::from(cells.flux[i])).sum::<DVec3>().normalize_or_zero();
         let is_one_peak = is_fine && peaks.iter().all(|&i| places[i].dot(middle) > TOGETHER);
         let tables = std::array::from_fn(|_| Tables::new());
-        Some(ProductTable {
-            partition,
-            cells,
-            sides,
-            peaks,
-            is_one_peak,
-            tables,
-            peak: level.peak(),
-            map_flux,
-        })
+        Some(ProductTable { partition, cells, peaks, is_one_peak, tables, peak: level.peak(), map_flux })
     }
 
     /// As [`ProductTable::prepare`], for those who know nothing of the surface.
@@ -294,11 +285,11 @@ impl ProductTable {
             if left < LEAST_LEFT * flux {
                 return None;
             }
-            let mut table = Table::new(&weights, &self.places(axis, &weights))?;
+            let mut table = Table::new(&weights, &self.places(axis))?;
             table.whole = flux as f32;
             return Some(table);
         }
-        Table::new(&weights, &self.places(axis, &weights))
+        Table::new(&weights, &self.places(axis))
     }
 
     /// Takes from the peaks what they have beyond their part, one over a power of two.
@@ -312,38 +303,10 @@ impl ProductTable {
         }
     }
 
-    /// Where cells lie in a plane, seen from within along an axis: circles about it are squares, as those of points are
-    /// that are mapped to a disc (Shirley and Chiu 1997), and areas are nearly the same as on the sphere.
-    ///
-    /// Cells without weight are nowhere.
-    fn places(&self, axis: Vec3, weights: &[f32]) -> Vec<Place> {
-        let frame = Frame::from_z(axis);
-        let Columns { x, y, z, .. } = &self.cells;
-        let point = |d: Vec3| {
-            let d = frame.to_local(d);
-            let scale = (1.0 - d.z).max(0.0).sqrt() / d.x.abs().max(d.y.abs()).max(1e-6);
-            [d.x * scale, d.y * scale]
-        };
-        let mut places = vec![Place::default(); weights.len()];
-        let lit = places.iter_mut().enumerate().filter(|(i, _)| weights[*i] > 0.0);
-        for (i, place) in lit {
-            let middle = Vec3::new(x[i], y[i], z[i]);
-            place.at = point(middle);
-            if let Some(sides) = self.sides.get(i) {
-                let way = |side: Vec3| {
-                    let to = point(middle + 0.5 * side);
-                    [to[0] - place.at[0], to[1] - place.at[1]]
-                };
-                let [a, b] = sides.map(way);
-                let swapped = a[0].abs() + b[1].abs() < a[1].abs() + b[0].abs();
-                let (first, second) = if swapped { (a[1], b[0]) } else { (a[0], b[1]) };
-                let bit = |is: bool, bit: u32| if is { bit } else { 0 };
-                place.lie =
-                    bit(swapped, SWAPPED) | bit(first < 0.0, FIRST_BACK) | bit(second < 0.0, SECOND_BACK);
-            }
-        }
-        // Peaks first: where they have a half, it is one half of the numbers.
-        self.peaks.iter().for_each(|&i| places[i].at[1] -= 4.0);
+    /// Peaks first: where they have a half, it is one half of the numbers.
+    fn places(&self, axis: Vec3) -> Places {
+        let mut places = Places::new(&self.cells, axis);
+        self.peaks.iter().for_each(|&i| places.put_first(i));
         places
     }
 

@@ -259,8 +259,8 @@ impl Plan {
     }
 }
 
-/// Samples of a render that may take long: just enough for a pilot to try out two materials.
-const LONG: u32 = 288;
+/// Samples of a render that may take long: just enough for a pilot to try out materials.
+const LONG: u32 = 1088;
 
 /// Something that is to change no mean.
 pub struct Technique {

@@ -3,6 +3,8 @@
 //! Rows of equal probability, exactly, so that stratified numbers stay stratified: where a cell has more than what is left of
 //! a row, the next rows have the rest of it. In a row cells are found without a branch.
 
+use super::place::Places;
+
 /// Rows: few enough that cells are as small across as along, and a power of two, as points are even for.
 const ROWS: usize = 16;
 /// What probabilities within a row are multiples of one over.
@@ -28,15 +30,6 @@ pub(super) struct Table {
     pub total: f32,
     /// Sum of what the weights would be if nothing else found the light.
     pub whole: f32,
-}
-
-/// Where a cell lies in a plane in which neighbours on the sphere are close, and how.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Place {
-    pub at: [f32; 2],
-    /// By what numbers run the plane's ways through it: [`SWAPPED`] if its first side runs along the plane's second axis,
-    /// [`FIRST_BACK`] and [`SECOND_BACK`] if its sides run against the axes that they lie along.
-    pub lie: u32,
 }
 
 /// Bits for the number of a cell.
@@ -70,7 +63,7 @@ impl Entry {
         self.cell as usize % MOST_CELLS
     }
 
-    /// How it lies, see [`Place::lie`].
+    /// How it lies, see [`Places::lie`].
     #[inline(always)]
     pub fn lie(self) -> u32 {
         self.cell & LIE
@@ -146,46 +139,60 @@ struct Piece {
     weight: f64,
 }
 
-/// A number that orders cells by place as [`f32::total_cmp`] does, those of one place by number: sorting whole numbers takes
-/// no branch.
-fn key(at: f32, cell: u16) -> u64 {
-    let bits = at.to_bits();
-    let ordered = if bits >> 31 == 1 { !bits } else { bits | 1 << 31 };
-    (u64::from(ordered) << 16) | u64::from(cell)
-}
-
-/// Cells by place.
-fn ordered(cells: impl Iterator<Item = u16>, at: impl Fn(u16) -> f32) -> Vec<u16> {
-    let mut keys: Vec<u64> = cells.map(|cell| key(at(cell), cell)).collect();
-    keys.sort_unstable();
+/// Cells as they lie along an axis, those of one place by number. Byte by byte, as comparisons take branches that nobody
+/// can foretell.
+fn ordered(lit: &[u16], at: &[u16]) -> Vec<u16> {
+    let mut keys: Vec<u32> = lit.iter().map(|&i| u32::from(at[i as usize]) << 16 | u32::from(i)).collect();
+    let mut sorted = vec![0; keys.len()];
+    for shift in [16, 24] {
+        let byte = |key: u32| (key >> shift) as usize & 0xff;
+        let mut starts = [0u16; 257];
+        keys.iter().for_each(|&key| starts[byte(key) + 1] += 1);
+        (1..256).for_each(|i| starts[i] += starts[i - 1]);
+        for &key in &keys {
+            let start = &mut starts[byte(key)];
+            sorted[*start as usize] = key;
+            *start += 1;
+        }
+        std::mem::swap(&mut keys, &mut sorted);
+    }
     keys.into_iter().map(|key| key as u16).collect()
 }
 
-/// Cuts the cells, in this order, into rows of equal weight.
-fn rows(order: &[u16], weights: &[f32]) -> Option<[Vec<Piece>; ROWS]> {
-    let total: f64 = order.iter().map(|&i| f64::from(weights[i as usize])).sum();
+/// Cuts the lit cells, as they lie along y, into rows of equal weight, in which they lie as they do along x.
+fn rows(lit: &[u16], weights: &[f32], places: &Places) -> Option<[Vec<Piece>; ROWS]> {
+    let by_y = ordered(lit, &places.y);
+    let weight = |cell: u16| f64::from(weights[cell as usize]);
+    let total: f64 = by_y.iter().map(|&cell| weight(cell)).sum();
     if !(total > 0.0 && total.is_finite()) {
         return None;
     }
-    let size = total / ROWS as f64;
-    let row_of = |at: f64| ((at / size) as usize).min(ROWS - 1);
-    let mut rows: [Vec<Piece>; ROWS] = Default::default();
-    let mut from = 0.0;
-    for &cell in order {
-        let to = from + f64::from(weights[cell as usize]);
-        // What is lost beside the others' sum is not without weight.
-        if to <= from {
-            rows[row_of(from)].push(Piece { cell, weight: size * f64::EPSILON });
-        }
-        let (first, last) = (row_of(from), row_of(to));
-        for (row, pieces) in (first..).zip(&mut rows[first..=last]) {
+    let mut froms = vec![0.0; weights.len()];
+    let mut sum = 0.0;
+    for &cell in &by_y {
+        froms[cell as usize] = sum;
+        sum += weight(cell);
+    }
+    let (size, over_size) = (total / ROWS as f64, ROWS as f64 / total);
+    let row_of = |at: f64| ((at * over_size) as usize).min(ROWS - 1);
+    let mut rows = std::array::from_fn(|_| Vec::with_capacity(lit.len() / (ROWS / 2)));
+    for cell in ordered(lit, &places.x) {
+        let from = froms[cell as usize];
+        let to = from + weight(cell);
+        let first = row_of(from);
+        let mut is_lost = true;
+        for row in first..=row_of(to) {
             let end = if row + 1 == ROWS { f64::INFINITY } else { (row + 1) as f64 * size };
             let weight = to.min(end) - from.max(row as f64 * size);
             if weight > 0.0 {
-                pieces.push(Piece { cell, weight });
+                rows[row].push(Piece { cell, weight });
+                is_lost = false;
             }
         }
-        from = to;
+        // What is lost beside the others' sum is not without weight.
+        if is_lost {
+            rows[first].push(Piece { cell, weight: size * f64::EPSILON });
+        }
     }
     Some(rows)
 }
@@ -193,10 +200,11 @@ fn rows(order: &[u16], weights: &[f32]) -> Option<[Vec<Piece>; ROWS]> {
 /// Running sums of the pieces in whole units.
 fn quantise(pieces: &[Piece], mut put: impl FnMut(u16, i16)) {
     let total: f64 = pieces.iter().map(|p| p.weight).sum();
+    let scale = f64::from(UNITS) / total;
     let (mut sum, mut last) = (0.0, 0);
     for (after, p) in (0..pieces.len() as i16).rev().zip(pieces) {
         sum += p.weight;
-        let ideal = (sum / total * f64::from(UNITS)).round() as i16;
+        let ideal = (sum * scale + 0.5) as i16;
         last = if after == 0 { UNITS } else { ideal.clamp(last + 1, UNITS - after) };
         put(p.cell, last);
     }
@@ -204,33 +212,33 @@ fn quantise(pieces: &[Piece], mut put: impl FnMut(u16, i16)) {
 
 impl Table {
     /// Of cells, at most [`MOST_CELLS`], with weights that are not negative. None if all weights are zero.
-    pub fn new(weights: &[f32], places: &[Place]) -> Option<Box<Self>> {
-        let lit = (0..weights.len() as u16).filter(|i| weights[*i as usize] > 0.0);
-        let order = ordered(lit, |i| places[i as usize].at[1]);
-        let mut rows = rows(&order, weights)?;
+    pub fn new(weights: &[f32], places: &Places) -> Option<Box<Self>> {
+        let lit: Vec<u16> = (0..weights.len() as u16).filter(|i| weights[*i as usize] > 0.0).collect();
+        let rows = rows(&lit, weights, places)?;
         let mut firsts = [0; ROWS * PARTS];
-        let (mut ends, mut cells, mut units) = (Vec::new(), Vec::new(), vec![0u32; weights.len()]);
-        for (firsts, row) in firsts.chunks_exact_mut(PARTS).zip(&mut rows) {
-            row.sort_unstable_by_key(|p| key(places[p.cell as usize].at[0], p.cell));
+        let room = rows.iter().map(|row| row.len() + AT_ONCE).sum();
+        let (mut ends, mut cells) = (Vec::with_capacity(room), Vec::with_capacity(room));
+        let mut units = vec![0u32; weights.len()];
+        for (firsts, row) in firsts.chunks_exact_mut(PARTS).zip(&rows) {
             ends.push(0);
-            let start = ends.len();
-            let mut last = 0;
             cells.push(0);
+            let (mut last, mut part) = (0, 0);
             quantise(row, |cell, end| {
+                while part < PARTS && end > (part << PART) as i16 {
+                    firsts[part] = ends.len() as u16;
+                    part += 1;
+                }
                 ends.push(end);
-                cells.push(u32::from(cell) | places[cell as usize].lie);
+                cells.push(u32::from(cell) | places.lie[cell as usize]);
                 units[cell as usize] += (end - last) as u32;
                 last = end;
             });
-            for (part, first) in (0..).zip(firsts) {
-                *first = (start + ends[start..].partition_point(|&end| end <= part << PART)) as u16;
-            }
             // The last entry is never passed; those after it may be looked at with it.
             ends.resize(ends.len() + AT_ONCE - 1, UNITS);
             cells.resize(ends.len(), 0);
         }
         cells.iter_mut().for_each(|cell| *cell |= units[*cell as usize % MOST_CELLS] << ABOVE);
-        let total = order.iter().map(|&i| f64::from(weights[i as usize])).sum::<f64>() as f32;
+        let total = lit.iter().map(|&i| f64::from(weights[i as usize])).sum::<f64>() as f32;
         Some(Box::new(Table {
             firsts,
             ends: ends.into(),
@@ -289,6 +297,11 @@ mod tests {
 
     const ONE_MINUS: f64 = 1.0 - f64::EPSILON / 2.0;
 
+    fn anywhere(rng: &mut TestRng, n: usize) -> Places {
+        let mut axis = || (0..n).map(|_| (rng.vec2().x * 65535.0) as u16).collect();
+        Places { x: axis(), y: axis(), lie: vec![0; n] }
+    }
+
     #[test]
     fn numbers_are_shared_out_as_the_probabilities_say() {
         let mut rng = TestRng::new(5);
@@ -296,8 +309,8 @@ mod tests {
             // Of all magnitudes, some zero.
             let weights: Vec<f32> =
                 (0..n).map(|i| if i % 5 == 3 { 0.0 } else { 10f32.powf(8.0 * rng.vec2().x - 4.0) }).collect();
-            let places: Vec<Place> =
-                (0..n as u32).map(|i| Place { at: rng.vec2().to_array(), lie: (i % 8) * SWAPPED }).collect();
+            let mut places = anywhere(&mut rng, n);
+            places.lie.iter_mut().zip(0..).for_each(|(lie, i)| *lie = (i % 8) * SWAPPED);
             let table = Table::new(&weights, &places).unwrap();
             let sum: f64 = (0..n).map(|i| table.pmf(i)).sum();
             // Whole units.
@@ -328,7 +341,8 @@ mod tests {
                 assert!(table.pmf(table.find(corner.map(|c: f64| c.min(ONE_MINUS))).cell) > 0.0);
             }
         }
-        assert!(Table::new(&[], &[]).is_none() && Table::new(&[0.0; 40], &[Place::default(); 40]).is_none());
+        assert!(Table::new(&[], &Places::default()).is_none());
+        assert!(Table::new(&[0.0; 40], &anywhere(&mut rng, 40)).is_none());
     }
 
     #[test]
@@ -336,7 +350,7 @@ mod tests {
         let mut rng = TestRng::new(7);
         let weights: Vec<f32> =
             (0..1024).map(|i| if i % 2 == 0 { 0.0 } else { 0.3 + rng.vec2().x }).collect();
-        let places: Vec<Place> = (0..1024).map(|_| Place { at: rng.vec2().to_array(), lie: 0 }).collect();
+        let places = anywhere(&mut rng, 1024);
         let table = Table::new(&weights, &places).unwrap();
         let total: f64 = weights.iter().map(|w| f64::from(*w)).sum();
         for (i, w) in weights.iter().enumerate().filter(|(_, w)| **w > 0.0) {
@@ -350,8 +364,11 @@ mod tests {
     fn half_of_all_is_half_of_the_rows() {
         let mut weights = vec![1.0; 64];
         weights[20] = 63.0;
-        let places: Vec<Place> =
-            (0..64).map(|i| Place { at: [(i % 8) as f32, (i / 8) as f32], lie: 0 }).collect();
+        let places = Places {
+            x: (0..64).map(|i| i % 8).collect(),
+            y: (0..64).map(|i| i / 8).collect(),
+            lie: vec![0; 64],
+        };
         let table = Table::new(&weights, &places).unwrap();
         assert!((table.pmf(20) - 0.5).abs() < 1e-3);
         // Of 32 numbers, one in each of 32 strips, 16 are its own but for the two rows that it shares.

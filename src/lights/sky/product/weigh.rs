@@ -15,26 +15,31 @@ pub(super) struct Columns {
     pub flux: Vec<f32>,
     /// Solid angle, steradians.
     pub angle: Vec<f32>,
+    /// Half way to the middles of its sides of larger u and of larger v, see [`super::partition::CellLight::sides`].
+    pub sides: [[Vec<f32>; 3]; 2],
 }
 
 impl Columns {
-    pub fn push(&mut self, middle: Vec3, reach: f32, flux: f32, angle: f32) {
+    pub fn push(&mut self, middle: Vec3, sides: [Vec3; 2], reach: f32, flux: f32, angle: f32) {
         self.x.push(middle.x);
         self.y.push(middle.y);
         self.z.push(middle.z);
         self.reach.push(reach.max(1e-4));
         self.flux.push(flux);
         self.angle.push(angle);
+        for (columns, side) in self.sides.iter_mut().zip(sides) {
+            columns.iter_mut().zip((middle + 0.5 * side).to_array()).for_each(|(column, x)| column.push(x));
+        }
     }
 
     pub fn memory(&self) -> u64 {
-        24 * self.flux.len() as u64
+        48 * self.flux.len() as u64
     }
 }
 
 /// The larger one; one instruction, where `f32::max` also minds NaN.
 #[inline(always)]
-fn larger(a: f32, b: f32) -> f32 {
+pub(super) fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
