@@ -9,6 +9,8 @@ A peer is a class with
     open(scene)                loads what `Scene` describes
     render(series, spp, seed)  (seconds of rendering alone, picture of height x width x 3), linear
     alpha(spp)                 part of each pixel that surfaces cover
+and, where it cannot render every scene,
+    refuses(scene)             why it does not render this one; nothing if it does
 """
 import argparse
 import json
@@ -116,6 +118,10 @@ def run(peer, a):
     done = []
     for name in a.scenes:
         scene = Scene(a.dir, name, a.size)
+        reason = peer.refuses(scene) if hasattr(peer, "refuses") else None
+        if reason:
+            print(f"{peer.program}: {name} left out: {reason}", file=sys.stderr)
+            continue
         peer.open(scene)
         truth = reference(peer, scene, a)
         series = [measure(peer, s, truth, a) for s in peer.series()]

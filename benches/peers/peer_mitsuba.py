@@ -13,6 +13,8 @@ import numpy as np
 from ladder import arguments, missing, run
 
 INSTALL = "pip install mitsuba numpy OpenEXR"
+# Each makes compiled kernels longer: compiling for a thousand was never seen to end.
+MOST_INSTANCES = 100
 
 
 def direct(bsdf_only=False):
@@ -102,6 +104,11 @@ class Mitsuba:
             settings = {"variant": self.variant, "sampler": "multijitter", "strategy": strategy}
             out.append({"name": f"Mitsuba {short} multijitter {strategy}", "settings": settings, "most": self.most})
         return out
+
+    def refuses(self, scene):
+        placed = sum(len(o.get("placements", [])) for o in scene.objects)
+        if self.variant != "scalar_rgb" and placed > MOST_INSTANCES:
+            return f"compiling for {placed} instances was never seen to end (scalar_rgb can)"
 
     def open(self, scene):
         mi = self.mi
