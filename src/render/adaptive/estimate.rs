@@ -2,6 +2,7 @@
 
 use crate::base::pixel_rect::PixelRect;
 use crate::render::film::{Film, Half};
+use rayon::prelude::*;
 
 /// The part of the picture's squared mean luminance that is added to every pixel's squared mean: it keeps the relative
 /// error of what is nearly black from counting as if it could be seen.
@@ -11,16 +12,22 @@ pub const EPSILON: f64 = 0.01;
 const LEAST: f64 = 1e-30;
 
 /// What is added to the squared mean of each pixel of `film`: [`EPSILON`] times the square of its mean luminance.
+///
+/// Pixels count alike there, as in the error that is promised. Samples would not do: outlines take more of them, and where
+/// those are a lamp's, a mean over samples is too bright and the errors relative to it are too small.
 pub fn floor_of(film: &Film) -> f64 {
-    let (mut sum, mut pixels) = (0.0, 0.0);
-    for rect in film.tiles() {
-        if let Some(tile) = film.tile_estimate(rect.x0, rect.y0) {
-            sum += tile.mean * rect.area() as f64;
-            pixels += rect.area() as f64;
-        }
-    }
-    let mean: f64 = if pixels > 0.0 { sum / pixels } else { 0.0 };
+    let rects: Vec<PixelRect> = film.tiles().collect();
+    // Summed by tile, then in the order of the tiles: threads must not change the last bit.
+    let sums: Vec<[f64; 2]> = rects.par_iter().map(|rect| luminance(film, rect)).collect();
+    let [sum, pixels] = sums.iter().fold([0.0; 2], |all, tile| [all[0] + tile[0], all[1] + tile[1]]);
+    let mean = if pixels > 0.0 { sum / pixels } else { 0.0 };
     (EPSILON * mean * mean).max(LEAST)
+}
+
+/// The sum over the pixels of `rect` that have samples in both halves, and how many these are.
+fn luminance(film: &Film, rect: &PixelRect) -> [f64; 2] {
+    let known = rect.pixels().filter(|&(x, y)| film.halves(x, y).is_some());
+    known.fold([0.0; 2], |[sum, n], (x, y)| [sum + f64::from(film.mean(x, y).luminance()), n + 1.0])
 }
 
 /// Estimated relative squared errors of the pixels of `rect` that have samples in both halves, each the mean over the

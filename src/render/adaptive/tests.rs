@@ -23,6 +23,25 @@ fn film(across: u32, mut halves: impl FnMut(u32, u32) -> [f32; 2]) -> Film {
     film
 }
 
+#[test]
+fn pixels_count_alike_however_many_samples_they_have() {
+    let even = film(2, |x, y| if (x, y) == (3, 3) { [52.0, 48.0] } else { [1.0, 1.0] });
+    let mut uneven = even.clone();
+    // An outline of a lamp: the same halves, of 64 samples each.
+    let mut tile = FilmTile::new(even.tiles().next().unwrap());
+    for replicate in 0..2 {
+        let v = if replicate == 0 { 52.0 } else { 48.0 };
+        let sample = FilmSample { radiance: Rgb::splat(v), alpha: 1.0 };
+        (0..63).for_each(|_| tile.add(3, 3, replicate, sample));
+    }
+    uneven.add_tile(&tile);
+    // 511 pixels of 1, and one of 50.
+    let floor = 0.01 * (561.0f64 / 512.0).powi(2);
+    for f in [&even, &uneven] {
+        assert!((floor_of(f) / floor - 1.0).abs() < 1e-6, "{} instead of {floor}", floor_of(f));
+    }
+}
+
 fn tiles(n: usize, spp: u32) -> Vec<Tile> {
     (0..n).map(|i| Tile { place: [i, 0], area: 256.0, spp, rays: u64::from(spp) * 256 }).collect()
 }
