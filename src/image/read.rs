@@ -258,10 +258,17 @@ fn decode_with_image(
 }
 
 fn texels8(picture: DynamicImage, encoding: Encoding) -> Texels {
-    let bytes = picture.into_rgba8().into_raw();
-    // Reuses the allocation where its alignment allows (it always does: bytes to byte arrays).
-    let quads = bytemuck::allocation::try_cast_vec::<u8, [u8; 4]>(bytes)
-        .unwrap_or_else(|(_, bytes)| bytes.chunks_exact(4).map(|c| [c[0], c[1], c[2], c[3]]).collect());
+    let quads = match picture {
+        // What most are. The library would write the copy twice, zeros first.
+        DynamicImage::ImageRgb8(rgb) => rgb.pixels().map(|p| [p.0[0], p.0[1], p.0[2], u8::MAX]).collect(),
+        other => {
+            let bytes = other.into_rgba8().into_raw();
+            // Reuses the allocation where its alignment allows (it always does: bytes to byte arrays).
+            bytemuck::allocation::try_cast_vec::<u8, [u8; 4]>(bytes).unwrap_or_else(|(_, bytes)| {
+                bytes.chunks_exact(4).map(|c| [c[0], c[1], c[2], c[3]]).collect()
+            })
+        }
+    };
     match encoding {
         Encoding::Srgb => Texels::Srgb8(quads),
         Encoding::Linear => Texels::Linear8(quads),

@@ -79,11 +79,13 @@ impl Cube {
     pub(super) fn of_alike(faces: &[ImageData; 6]) -> Self {
         let n = faces[0].width;
         let source = |face: usize, x: usize, y: usize| {
-            let (x, y) = (x as i32 - 1, y as i32 - 1);
-            let inside = |i: i32| (0..n as i32).contains(&i);
-            // Nothing is at the corners of the border; any texel will do.
-            let (face, x, y) =
-                if inside(x) || inside(y) { source_texel(n, face, x, y) } else { (face, 0, 0) };
+            let inner = |i: usize| (1..=n).contains(&i);
+            let (face, x, y) = match (inner(x), inner(y)) {
+                (true, true) => (face, x - 1, y - 1),
+                // Nothing is at the corners of the border; any texel will do.
+                (false, false) => (face, 0, 0),
+                _ => source_texel(n, face, x as i32 - 1, y as i32 - 1),
+            };
             (face, y * n + x)
         };
         let tiles = Tiles::new(faces, 6, [n + 2, n + 2], source);

@@ -171,21 +171,19 @@ impl Tiles {
         let n = charts * down * across;
         assert!(n > 0 && n * AREA <= u32::MAX as usize, "{n} blocks of texels");
         // Blocks at the right and lower end are filled up with the last texel.
-        let place = |block: usize, k: usize| {
-            let (row, x) = (block / across, SIDE * (block % across) + k % SIDE);
-            let y = SIDE * (row % down) + k / SIDE;
-            source(row / down, x.min(width - 1), y.min(height - 1))
+        let source = &source;
+        let place = |block: usize| {
+            let (row, x) = (block / across, SIDE * (block % across));
+            let (chart, y) = (row / down, SIDE * (row % down));
+            move |k: usize| source(chart, (x + k % SIDE).min(width - 1), (y + k / SIDE).min(height - 1))
         };
         let blocks = match &pictures[0].texels {
-            Texels::Srgb8(_) => {
-                Blocks::Srgb8(Pages::from_fn(n, |b| Block8(block8(pictures, |k| place(b, k)))))
-            }
-            Texels::Linear8(_) => {
-                Blocks::Linear8(Pages::from_fn(n, |b| Block8(block8(pictures, |k| place(b, k)))))
-            }
+            Texels::Srgb8(_) => Blocks::Srgb8(Pages::from_fn(n, |b| Block8(block8(pictures, place(b))))),
+            Texels::Linear8(_) => Blocks::Linear8(Pages::from_fn(n, |b| Block8(block8(pictures, place(b))))),
             Texels::F32(_) => Blocks::F32(Pages::from_fn(n, |b| {
+                let place = place(b);
                 Block32(std::array::from_fn(|k| {
-                    let (picture, i) = place(b, k);
+                    let (picture, i) = place(k);
                     match &pictures[picture].texels {
                         Texels::F32(t) => t[i],
                         _ => [0.0; 3],
@@ -238,6 +236,7 @@ impl Tiles {
     }
 }
 
+#[inline(always)]
 fn block8(pictures: &[ImageData], place: impl Fn(usize) -> (usize, usize)) -> [[u8; 4]; AREA] {
     std::array::from_fn(|k| {
         let (picture, i) = place(k);
