@@ -21,6 +21,13 @@ impl Default for Prepared {
 }
 
 impl Prepared {
+    /// The material's own struct, kept. Panics as [`Prepared::view`].
+    pub fn of<T: Pod>(own: T) -> Self {
+        let mut out = Prepared::default();
+        *out.view_mut() = own;
+        out
+    }
+
     /// The material's own struct. Panics (at the first use, in any test) if it is larger than the room.
     #[inline]
     pub fn view<T: Pod>(&self) -> &T {

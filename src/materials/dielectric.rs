@@ -302,6 +302,10 @@ impl Material for Dielectric {
         *out.view_mut::<Rgb>() = self.tint.at(vertex);
     }
 
+    fn prepared_everywhere(&self) -> Option<Prepared> {
+        self.tint.constant().map(Prepared::of)
+    }
+
     fn eval(&self, m: &Prepared, wo: Vec3, wi: Vec3) -> BsdfEval {
         match (&self.rough, View::new(wo, self.eta)) {
             (Some(rough), Some(view)) => rough.evaluate(&view, view.turn(wi), *m.view()),

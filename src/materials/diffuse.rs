@@ -54,11 +54,7 @@ impl Material for Diffuse {
     }
 
     fn prepared_everywhere(&self) -> Option<Prepared> {
-        self.albedo.constant().map(|albedo| {
-            let mut out = Prepared::default();
-            *out.view_mut::<Rgb>() = albedo;
-            out
-        })
+        self.albedo.constant().map(Prepared::of)
     }
 
     #[inline]

@@ -143,6 +143,13 @@ impl<L: Lobe> Glossy<L> {
         })
     }
 
+    fn at(&self, diffuse: Rgb, specular: Rgb) -> At {
+        let (d, s) = (diffuse.luminance(), specular.luminance());
+        let least = if self.lobe.has_white() { 0.1 } else { 0.0 };
+        let share = if d + s > 0.0 { (s / (d + s)).max(least) } else { 1.0 };
+        At { diffuse, specular, share }
+    }
+
     /// Both directions as seen from the front, if the back looks the same; None where nothing is scattered.
     #[inline]
     fn upright(&self, wo: Vec3, wi: Vec3) -> Option<(Vec3, Vec3)> {
@@ -211,11 +218,12 @@ impl<L: Lobe> Material for Glossy<L> {
     }
 
     fn prepare(&self, vertex: &Vertex, out: &mut Prepared) {
-        let (diffuse, specular) = (self.diffuse.at(vertex), self.specular.at(vertex));
-        let (d, s) = (diffuse.luminance(), specular.luminance());
-        let least = if self.lobe.has_white() { 0.1 } else { 0.0 };
-        let share = if d + s > 0.0 { (s / (d + s)).max(least) } else { 1.0 };
-        *out.view_mut() = At { diffuse, specular, share };
+        *out.view_mut() = self.at(self.diffuse.at(vertex), self.specular.at(vertex));
+    }
+
+    fn prepared_everywhere(&self) -> Option<Prepared> {
+        let colors = self.diffuse.constant().zip(self.specular.constant());
+        colors.map(|(diffuse, specular)| Prepared::of(self.at(diffuse, specular)))
     }
 
     #[inline]

@@ -197,6 +197,13 @@ impl Material for Metal {
         };
     }
 
+    fn prepared_everywhere(&self) -> Option<Prepared> {
+        match &self.color {
+            Color::Fixed(at) => Some(Prepared::of(*at)),
+            Color::Textured(_) => None,
+        }
+    }
+
     fn eval(&self, m: &Prepared, wo: Vec3, wi: Vec3) -> BsdfEval {
         let side = 1f32.copysign(wo.z);
         let (mut up_o, mut up_i) = (wo, wi);

@@ -42,6 +42,10 @@ impl Material for Mirror {
         *out.view_mut::<Rgb>() = self.reflectance.at(vertex);
     }
 
+    fn prepared_everywhere(&self) -> Option<Prepared> {
+        self.reflectance.constant().map(Prepared::of)
+    }
+
     fn eval(&self, _m: &Prepared, _wo: Vec3, _wi: Vec3) -> BsdfEval {
         BsdfEval::default()
     }
