@@ -1,10 +1,12 @@
-//! Surface points of one plain material, where no light is sampled: what [`PathTracer::extend`] does for each, along
-//! columns, and without a record of each.
+//! Surface points of one plain material: what [`PathTracer::extend`] does for each, along columns, and where no light is
+//! sampled without a record of each.
 
 use super::Workspace;
 use super::depth::Block;
 use super::path::{PathScratch, PathState, PathTracer};
 use super::points::PointLanes;
+use super::strategy::Strategy;
+use super::surface::{Look, Surface};
 use super::together::Alike;
 use crate::base::lanes::{Columns, LANES};
 use crate::base::light::Receiver;
@@ -12,25 +14,61 @@ use crate::base::material::Transmission;
 use crate::base::vertices::Leaving;
 use crate::color::Rgb;
 use crate::math::simd::{Kernel, dispatch};
-use crate::sampler::{Dim, Slot, ray_key};
+use crate::sampler::{Dim, Slot, points_2d, ray_key};
+
+/// The lanes whose paths go on.
+pub(super) struct Kept {
+    order: [usize; LANES],
+    n: usize,
+}
+
+impl Kept {
+    /// In the order of their rays.
+    pub fn lanes(&self) -> &[usize] {
+        &self.order[..self.n]
+    }
+}
 
 impl Block<'_> {
-    /// Whether points that are alike may go on by columns: nothing is asked of each but where its path goes on.
-    pub(super) fn goes_by_columns(&self) -> bool {
-        !self.samples_lights
+    /// The path that a ray of this depth belongs to.
+    #[inline(always)]
+    fn state(&self, states: &[PathState], ray: u32) -> PathState {
+        if self.depth == 1 { PathState::from_camera(ray) } else { states[ray as usize] }
+    }
+
+    /// Whether points of an object's slot need no record: nothing is asked of each but where its path goes on.
+    pub(super) fn goes_by_columns(&self, (object, slot): (u32, u32), look: &Look) -> bool {
+        // Beside other lights the guided one is left to scattered rays, they are not.
+        let left = || self.guided.is_some() && self.scene.lights.list.len() == 1;
+        !self.samples_lights || look.is_delta || left() && self.strategies.of(object, slot) == Strategy::Bsdf
     }
 }
 
 impl PathTracer {
-    /// As [`PathTracer::scatter`]. `state` tells the path of a ray.
-    pub(super) fn extend_many(
+    /// As [`PathTracer::scatter`], of points that have no record.
+    pub(super) fn scatter_many(
         &self,
         block: &Block,
         alike: &Alike,
         work: &mut Workspace,
         paths: &mut PathScratch,
-        state: impl Fn(&[PathState], u32) -> PathState,
     ) {
+        let (all, shadow_rays) = (alike.n as u64, block.shadow_rays());
+        work.avoided.points += all;
+        work.avoided.candidates += all * (shadow_rays + 1);
+        work.avoided.scattered_alone += all * shadow_rays;
+        self.extend_many(block, alike, (&[], 0.0), work, paths);
+    }
+
+    /// As [`PathTracer::extend`]. `surfaces` are the records of the points, if they have any.
+    pub(super) fn extend_many(
+        &self,
+        block: &Block,
+        alike: &Alike,
+        (surfaces, guided_pdf): (&[Surface], f32),
+        work: &mut Workspace,
+        paths: &mut PathScratch,
+    ) -> Kept {
         let Alike { vertices, plain, n, .. } = alike;
         let n = *n;
         let PathScratch { states, next, hits, points, .. } = paths;
@@ -38,17 +76,19 @@ impl PathTracer {
         let roulette = block.depth >= self.roulette_depth && block.depth < self.max_depth;
         let mut lobes = [[0.0; LANES]; 2];
         if roulette || plain.look.picks_lobe {
-            draw_lobes(&points, block.depth, &mut lobes);
+            let [x, y] = &mut lobes;
+            points_2d(points.samplers, points.indices, Dim::at(block.depth, Slot::LobeAndRoulette), x, y);
         }
         let mut wo = Columns::default();
         vertices.local_viewers(&mut wo);
         let samples = plain.material.sample_many(&plain.prepared, &wo, &points.bsdf, &lobes[0], n);
         let mut leaving = Leaving::default();
         vertices.leave(&samples.wi, &mut leaving);
+        let competes = block.samples_lights && !plain.look.is_delta;
         let mut order = [0; LANES];
         let (mut kept, mut gambled) = (0, 0);
         for (lane, &i) in hits[alike.range()].iter().enumerate() {
-            let before = state(states, i);
+            let before = block.state(states, i);
             let weight = samples.weight.get(lane);
             let weight = Rgb::from(weight.to_array());
             let mut beta = before.beta * weight;
@@ -70,9 +110,10 @@ impl PathTracer {
             next.push(PathState {
                 beta,
                 eta2,
-                pdf: f32::INFINITY,
-                from: Receiver::NOWHERE,
-                guided_pdf: 0.0,
+                pdf: if competes & !samples.delta[lane] { samples.pdf[lane] } else { f32::INFINITY },
+                // Without records light samples have no density anywhere.
+                from: surfaces.get(lane).map_or(Receiver::NOWHERE, |s| s.receiver),
+                guided_pdf,
                 index: before.index,
             });
             order[kept] = lane;
@@ -86,19 +127,9 @@ impl PathTracer {
             let (o, d) = (leaving.o.picked(&order), leaving.d.picked(&order));
             work.next.push_lanes(&o, &d, &order.map(|lane| keys[lane]), kept);
         }
-        let (all, shadow_rays) = (n as u64, block.shadow_rays());
-        work.avoided.points += all;
-        work.avoided.candidates += all * (shadow_rays + 1);
-        work.avoided.scattered_alone += all * shadow_rays;
         work.avoided.absorbed += (n - kept - gambled) as u64;
         work.avoided.roulette += gambled as u64;
-    }
-}
-
-/// See [`Slot::LobeAndRoulette`].
-fn draw_lobes(points: &PointLanes, depth: u32, out: &mut [[f32; LANES]; 2]) {
-    for (lane, (sampler, &index)) in points.samplers.iter().zip(points.indices).enumerate() {
-        [out[0][lane], out[1][lane]] = sampler.get_2d(index, Dim::at(depth, Slot::LobeAndRoulette));
+        Kept { order, n: kept }
     }
 }
 

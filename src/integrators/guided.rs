@@ -4,15 +4,14 @@ use super::Workspace;
 use super::depth::Block;
 use super::path::{PathScratch, PathTracer};
 use super::points::VertexPoint;
-use super::several::Counts;
+use super::several::{Counts, draw};
 use super::strategy::{MOST_SPLIT, Strategy};
 use super::surface::Surface;
+use super::together::Alike;
 use super::{PathId, light_dim};
-use crate::base::directions::LANES;
-use crate::base::light::{ChosenLight, Guide, GuidedLight, Lobes};
+use crate::base::light::{ChosenLight, Guide, GuidedLight, LightSample, Lobes};
 use crate::base::material::Scattering;
 use crate::sampler::{Dim, Slot};
-use glam::Vec3;
 
 /// So few samples are not worth being worked out together.
 const FEW: f32 = 2.0;
@@ -20,97 +19,159 @@ const FEW: f32 = 2.0;
 /// A guided light and its index.
 type Guided<'a> = (u32, &'a dyn GuidedLight);
 
+/// How the guided light is found from a surface.
+#[derive(Clone, Copy, Default)]
+struct How {
+    strategy: Strategy,
+    /// What the light has worked out for the surface.
+    guide: Guide,
+    /// Whether it can be sampled at all.
+    ready: bool,
+    /// Light samples; where they are not several, of any light.
+    lit: u32,
+    /// Scattered rays that compete with each.
+    scattered: u32,
+}
+
 impl PathTracer {
-    /// A light sample or none, then the direction in which the path goes on: as [`PathTracer::scatter`], with what the
-    /// light worked out for this surface still at hand when the density of that direction is asked for.
+    /// Light samples or none, then the directions in which paths go on: as [`PathTracer::scatter`], with what the light
+    /// worked out for each surface still at hand when the density of such a direction is asked for. Each stage for all
+    /// surfaces, as they wait for tables that lie anywhere in memory: together, and not one after the other.
     pub(super) fn scatter_guided(
         &self,
         block: &Block,
         guided: Guided,
-        s: &Surface,
+        (surfaces, alike): (&mut [Surface], Option<&Alike>),
         work: &mut Workspace,
         paths: &mut PathScratch,
     ) {
+        let mut hows = [How::default(); Surface::AT_ONCE];
+        for (how, s) in hows.iter_mut().zip(&*surfaces) {
+            *how = block.how(guided, s);
+        }
+        let asks_each = block.each_light && block.scene.lights.list.len() > 1;
+        for (how, s) in hows.iter().zip(surfaces.iter_mut()) {
+            if how.lit == 1 && !asks_each {
+                s.lit = block.sample_one(s, guided, how, &paths.points.get(s.number));
+            }
+        }
+        for (how, s) in hows.iter().zip(&*surfaces) {
+            let before = work.shadow.len();
+            match how.lit {
+                0 => {}
+                1 if asks_each => block.ask_all(s, guided, how, work, paths),
+                1 => {
+                    if let Some((chosen, l)) = &s.lit {
+                        block.connect_one(s, (guided.0, how), (*chosen, l), work, paths);
+                    }
+                }
+                _ => block.ask_again(s, guided, how, work, paths),
+            }
+            block.count(how, work.shadow.len() - before, work);
+        }
+        let hows = &hows[..surfaces.len()];
+        self.go_on(block, guided, (surfaces, alike, hows), work, paths);
+    }
+
+    /// The directions in which paths go on.
+    fn go_on(
+        &self,
+        block: &Block,
+        (index, light): Guided,
+        (surfaces, alike, hows): (&[Surface], Option<&Alike>, &[How]),
+        work: &mut Workspace,
+        paths: &mut PathScratch,
+    ) {
+        // Those of one material have one strategy.
+        let many = alike.filter(|_| hows.last().is_some_and(|how| how.scattered <= 1));
+        let singles = surfaces.len() - many.map_or(0, |alike| alike.n);
+        let first = paths.next.len();
+        // Whose rays these are.
+        let mut owners = [0u8; Surface::AT_ONCE * MOST_SPLIT as usize];
+        for (i, (how, s)) in hows.iter().zip(surfaces).enumerate().take(singles) {
+            if how.ends(block) {
+                work.avoided.lit_alone += 1;
+                continue;
+            }
+            let before = paths.next.len() - first;
+            if how.scattered > 1 {
+                self.extend_several(block, s, (how.scattered, how.even_pdf()), work, paths);
+            } else {
+                self.extend(block, s, &paths.points.get(s.number), how.even_pdf(), work, paths);
+            }
+            owners[before..paths.next.len() - first].fill(i as u8);
+        }
+        match many.zip(hows.last()) {
+            None => {}
+            Some((alike, how)) if how.ends(block) => work.avoided.lit_alone += alike.n as u64,
+            Some((alike, how)) => {
+                let owners = &mut owners[paths.next.len() - first..];
+                let records = (&surfaces[singles..], how.even_pdf());
+                let kept = self.extend_many(block, alike, records, work, paths);
+                owners.iter_mut().zip(kept.lanes()).for_each(|(owner, lane)| *owner = (singles + lane) as u8);
+            }
+        }
+        for (k, &i) in (first..paths.next.len()).zip(&owners) {
+            let (s, how) = (&surfaces[usize::from(i)], &hows[usize::from(i)]);
+            if how.competes() {
+                let pdf = light.pdf(&s.receiver, &how.guide, work.next.direction(k));
+                paths.next[k].guided_pdf = block.guided_pmf(index, s) * pdf;
+            }
+        }
+    }
+}
+
+impl How {
+    /// Whether the density with which light samples find a scattered ray has to be asked for.
+    fn competes(&self) -> bool {
+        self.ready && matches!(self.strategy, Strategy::Both(_))
+    }
+
+    /// That density, if it is the same for all rays.
+    fn even_pdf(&self) -> f32 {
+        if self.strategy.is_light() { f32::INFINITY } else { 0.0 }
+    }
+
+    /// Whether light samples have counted all that scattered rays would find, and there is nothing else to be found.
+    fn ends(&self, block: &Block) -> bool {
+        self.strategy.is_light() && block.guided_alone
+    }
+}
+
+impl Block<'_> {
+    fn how(&self, (_, light): Guided, s: &Surface) -> How {
         let delta = s.material.is_delta();
-        let strategy = if delta { Strategy::Bsdf } else { block.strategies.of(&s.v) };
-        let (index, light) = guided;
+        let strategy = if delta { Strategy::Bsdf } else { self.strategies.of(s.v.object, s.v.slot) };
         let mut guide = Guide::default();
         let split = match strategy {
-            Strategy::Light(n) if block.splits => u32::from(n),
-            Strategy::Both(n) if block.splits && block.ends => u32::from(n),
+            Strategy::Light(n) if self.splits => u32::from(n),
+            Strategy::Both(n) if self.splits && self.ends => u32::from(n),
             _ => 1,
         };
-        let split = (split / block.times).max(1);
+        let split = (split / self.times).max(1);
         let ready = strategy != Strategy::Bsdf && {
             let scattering = s.material.scattering(&s.prepared).unwrap_or(Scattering::EVEN);
             let lobes = Lobes { wo: s.v.wo, scattering, alone: strategy.is_light(), samples: split };
             light.prepare(&s.receiver, &lobes, &mut guide)
         };
         let scattered = if strategy.is_light() { 0 } else { split };
-        let before = work.shadow.len();
-        if !delta {
-            let how = How { guided, guide, ready, scattered: scattered as f32 };
-            match split {
-                1 => block.ask_guided(s, &how, work, paths),
-                _ => block.ask_again(s, &how, split, work, paths),
-            }
-        }
-        let more = u64::from(split) - 1;
-        work.avoided.candidates += more + u64::from(scattered.max(1)) - 1;
-        let missing = block.shadow_rays() + more - (work.shadow.len() - before) as u64;
-        let alone = match strategy {
-            _ if delta => missing,
+        How { strategy, guide, ready, lit: if delta { 0 } else { split }, scattered }
+    }
+
+    /// Counts rays that are spared at a surface with so many shadow rays.
+    fn count(&self, how: &How, shadow_rays: usize, work: &mut Workspace) {
+        let more = u64::from(how.lit.max(1)) - 1;
+        work.avoided.candidates += more + u64::from(how.scattered.max(1)) - 1;
+        let missing = self.shadow_rays() + more - shadow_rays as u64;
+        let alone = match how.strategy {
+            _ if how.lit == 0 => missing,
             Strategy::Bsdf => missing.min(1),
             Strategy::Light(_) | Strategy::Both(_) => 0,
         };
         work.avoided.scattered_alone += alone;
         work.avoided.dark_samples += missing - alone;
-        // Light samples have counted all that scattered rays would find, and there is nothing else to be found.
-        if strategy.is_light() && block.guided_alone {
-            work.avoided.lit_alone += 1;
-            return;
-        }
-        let pmf = block.guided_pmf(index, s);
-        let guided_pdf = |wi: Vec3| match strategy {
-            Strategy::Light(_) => f32::INFINITY,
-            Strategy::Both(_) if ready => pmf * light.pdf(&s.receiver, &guide, wi),
-            Strategy::Both(_) | Strategy::Bsdf => 0.0,
-        };
-        if scattered <= 1 {
-            let point = paths.points.get(s.number);
-            return self.extend(block, s, &point, work, paths, guided_pdf);
-        }
-        let id = paths.points.get(s.number).id;
-        let id = PathId { sampler: id.sampler.times(split), index: id.index.wrapping_mul(split), ..id };
-        let points = draw(&id, Dim::at(block.depth, Slot::BsdfUv));
-        for k in 0..split {
-            let id = PathId { index: id.index.wrapping_add(k), ..id };
-            let bsdf = points.map(|column| column[k as usize]);
-            let point = VertexPoint { id, light: [0.0; 2], bsdf, share: 1.0 / split as f32 };
-            self.extend(block, s, &point, work, paths, guided_pdf);
-        }
     }
-}
 
-/// The points of some samples from one on, as many as any surface takes.
-#[inline]
-fn draw(first: &PathId, dim: Dim) -> [[f32; LANES]; 2] {
-    const { assert!(MOST_SPLIT as usize <= LANES) };
-    first.sampler.few_2d(first.index, dim)
-}
-
-/// How the guided light is sampled from a surface.
-struct How<'a> {
-    guided: Guided<'a>,
-    /// What it has worked out for the surface.
-    guide: Guide,
-    /// Whether it can be sampled at all.
-    ready: bool,
-    /// How many scattered rays compete.
-    scattered: f32,
-}
-
-impl Block<'_> {
     /// The probability of choosing the guided light.
     #[inline]
     fn guided_pmf(&self, index: u32, s: &Surface) -> f32 {
@@ -120,77 +181,103 @@ impl Block<'_> {
         }
     }
 
-    /// Shadow rays to one light, or to each.
+    /// A point on the guided light, or on one that is chosen.
     #[inline]
-    fn ask_guided(&self, s: &Surface, how: &How, work: &mut Workspace, paths: &mut PathScratch) {
+    fn sample_one(
+        &self,
+        s: &Surface,
+        guided: Guided,
+        how: &How,
+        point: &VertexPoint,
+    ) -> Option<(ChosenLight, LightSample)> {
+        let chosen = if self.scene.features.many_lights {
+            let id = &point.id;
+            let pick = id.sampler.get_1d(id.index, Dim::at(self.depth, Slot::LightPick));
+            self.scene.lights.sampler.sample(&s.receiver, pick)?
+        } else {
+            ChosenLight { light: guided.0, pmf: 1.0 }
+        };
+        Some((chosen, self.sample(s, guided, how, chosen.light, point.light)?))
+    }
+
+    #[inline]
+    fn sample(
+        &self,
+        s: &Surface,
+        (index, light): Guided,
+        how: &How,
+        which: u32,
+        u: [f32; 2],
+    ) -> Option<LightSample> {
+        match which == index {
+            true if how.ready => light.sample(&s.receiver, &how.guide, u),
+            true => None,
+            false => self.scene.lights.list[which as usize].sample_li(&s.receiver, u),
+        }
+    }
+
+    /// A shadow ray to what was sampled of a light.
+    #[inline(never)]
+    fn connect_one(
+        &self,
+        s: &Surface,
+        (guided, how): (u32, &How),
+        (chosen, l): (ChosenLight, &LightSample),
+        work: &mut Workspace,
+        paths: &mut PathScratch,
+    ) {
+        let scattered = if chosen.light == guided { how.scattered } else { how.scattered.max(1) };
+        self.connect(s, chosen, l, scattered as f32, work, paths);
+    }
+
+    /// Shadow rays to each light.
+    fn ask_all(&self, s: &Surface, guided: Guided, how: &How, work: &mut Workspace, paths: &mut PathScratch) {
         let point = paths.points.get(s.number);
         let id = &point.id;
-        let lights = &self.scene.lights;
-        if self.each_light && lights.list.len() > 1 {
-            for (number, light) in (0..).zip(&lights.list) {
-                let u = match number {
-                    _ if light.is_delta() => [0.0; 2],
-                    0 => point.light,
-                    _ => id.sampler.get_2d(id.index, light_dim(self.depth, number)),
-                };
-                self.ask_one(s, how, ChosenLight { light: number, pmf: 1.0 }, u, work, paths);
+        for (number, light) in (0..).zip(&self.scene.lights.list) {
+            let u = match number {
+                _ if light.is_delta() => [0.0; 2],
+                0 => point.light,
+                _ => id.sampler.get_2d(id.index, light_dim(self.depth, number)),
+            };
+            if let Some(l) = self.sample(s, guided, how, number, u) {
+                let chosen = ChosenLight { light: number, pmf: 1.0 };
+                self.connect_one(s, (guided.0, how), (chosen, &l), work, paths);
             }
-            return;
         }
-        let chosen = if self.scene.features.many_lights {
-            let pick = id.sampler.get_1d(id.index, Dim::at(self.depth, Slot::LightPick));
-            let Some(chosen) = lights.sampler.sample(&s.receiver, pick) else { return };
-            chosen
-        } else {
-            ChosenLight { light: how.guided.0, pmf: 1.0 }
-        };
-        self.ask_one(s, how, chosen, point.light, work, paths);
     }
 
     /// Several shadow rays to the only light there is; each sample has the weight of a light that is chosen as many times
     /// as often. Their points follow one another in a sequence of as many more: together they are as even as if so many
     /// paths had drawn one.
     #[inline]
-    fn ask_again(&self, s: &Surface, how: &How, n: u32, work: &mut Workspace, paths: &mut PathScratch) {
+    fn ask_again(
+        &self,
+        s: &Surface,
+        guided: Guided,
+        how: &How,
+        work: &mut Workspace,
+        paths: &mut PathScratch,
+    ) {
+        let n = how.lit;
         let id = paths.points.get(s.number).id;
         let id = PathId { sampler: id.sampler.times(n), index: id.index.wrapping_mul(n), ..id };
         let points = draw(&id, Dim::at(self.depth, Slot::LightUv));
         if !how.ready {
             return;
         }
-        let (light, guided) = how.guided;
         if how.guide.worth * n as f32 <= FEW {
-            let chosen = ChosenLight { light, pmf: n as f32 };
+            let chosen = ChosenLight { light: guided.0, pmf: n as f32 };
             for k in 0..n as usize {
-                self.ask_one(s, how, chosen, points.map(|column| column[k]), work, paths);
+                let u = points.map(|column| column[k]);
+                if let Some(l) = guided.1.sample(&s.receiver, &how.guide, u) {
+                    self.connect_one(s, (guided.0, how), (chosen, &l), work, paths);
+                }
             }
             return;
         }
-        let lanes = guided.sample_many(&s.receiver, &how.guide, &points, n as usize);
-        let counts = Counts { lit: n as f32, scattered: how.scattered };
-        self.connect_many(s, light, &lanes, counts, work, paths);
-    }
-
-    #[inline]
-    fn ask_one(
-        &self,
-        s: &Surface,
-        how: &How,
-        chosen: ChosenLight,
-        u: [f32; 2],
-        work: &mut Workspace,
-        paths: &mut PathScratch,
-    ) {
-        let (index, light) = how.guided;
-        let is_guided = chosen.light == index;
-        let sample = match is_guided {
-            true if how.ready => light.sample(&s.receiver, &how.guide, u),
-            true => None,
-            false => self.scene.lights.list[chosen.light as usize].sample_li(&s.receiver, u),
-        };
-        if let Some(l) = sample {
-            let scattered = if is_guided { how.scattered } else { how.scattered.max(1.0) };
-            self.connect(s, chosen, &l, scattered, work, paths);
-        }
+        let lanes = guided.1.sample_many(&s.receiver, &how.guide, &points, n as usize);
+        let counts = Counts { lit: n as f32, scattered: how.scattered as f32 };
+        self.connect_many(s, guided.0, &lanes, counts, work, paths);
     }
 }

@@ -141,7 +141,7 @@ pub(super) struct PathState {
 impl PathState {
     /// Of a camera ray: what it meets shows all that it has.
     #[inline(always)]
-    fn from_camera(index: u32) -> Self {
+    pub(super) fn from_camera(index: u32) -> Self {
         PathState {
             beta: Rgb::WHITE,
             pdf: f32::INFINITY,
@@ -263,10 +263,10 @@ impl PathTracer {
         paths.sort_out(&work.hits, rays);
         paths.escapes.add_background(scene, &mut out.li);
         paths.draw(&block, |_, i| i);
-        let mut some = Together::new(block.goes_by_columns());
+        let mut some = Together::new(&block, true);
         loop {
             let met = Meetings { rays, hits: &work.hits, spread: batch.spread };
-            let Some(found) = some.next(scene, &met, &paths.hits, PathState::from_camera) else { break };
+            let Some(found) = some.next(&met, &paths.hits, PathState::from_camera) else { break };
             for s in found.surfaces.iter() {
                 out.alpha[s.state.index as usize] = 1.0;
                 if batch.want_first {
@@ -274,16 +274,15 @@ impl PathTracer {
                 }
                 block.add_emission(&s.state, &s.v, -s.v.wo, out);
             }
-            self.scatter(&block, found.surfaces, work, paths);
-            if let Some(like) = &found.alike {
+            if let Some(like) = found.alike.as_ref().filter(|like| !like.recorded) {
                 for (lane, &i) in paths.hits[like.range()].iter().enumerate() {
                     out.alpha[i as usize] = 1.0;
                     if batch.want_first {
                         out.first[i as usize] = Some(first_hit(scene, like.vertices.get(lane)));
                     }
                 }
-                self.extend_many(&block, like, work, paths, |_, i| PathState::from_camera(i));
             }
+            self.scatter(&block, found, work, paths);
             block.resolve_many(work, paths, out);
         }
         block.resolve_shadows(work, paths, out);
@@ -307,19 +306,16 @@ impl PathTracer {
         if goes_on {
             paths.draw(block, |states, i| states[i as usize].index);
         }
-        let mut some = Together::new(goes_on && block.goes_by_columns());
+        let mut some = Together::new(block, goes_on);
         loop {
             let met = Meetings { rays, hits: &work.hits, spread: 0.0 };
             let state = |i: u32| paths.states[i as usize];
-            let Some(found) = some.next(block.scene, &met, &paths.hits, state) else { break };
+            let Some(found) = some.next(&met, &paths.hits, state) else { break };
             for s in found.surfaces.iter() {
                 block.add_emission(&s.state, &s.v, -s.v.wo, out);
             }
             if goes_on {
-                self.scatter(block, found.surfaces, work, paths);
-                if let Some(like) = &found.alike {
-                    self.extend_many(block, like, work, paths, |states, i| states[i as usize]);
-                }
+                self.scatter(block, found, work, paths);
                 block.resolve_many(work, paths, out);
             }
         }

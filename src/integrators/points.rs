@@ -22,8 +22,6 @@ pub struct VertexPoint {
     pub light: [f32; 2],
     /// See [`Slot::BsdfUv`].
     pub bsdf: [f32; 2],
-    /// What part of the path goes on with it: less than 1 if it goes on in several directions.
-    pub share: f32,
 }
 
 /// What a few surface points draw to go on, as columns.
@@ -78,7 +76,7 @@ impl VertexPoints {
     #[inline]
     pub fn get(&self, k: usize) -> VertexPoint {
         let at = |c: &[Vec<f32>; 2]| [0, 1].map(|a| c[a].get(k).copied().unwrap_or(0.0));
-        VertexPoint { id: self.ids.get(k), light: at(&self.light), bsdf: at(&self.bsdf), share: 1.0 }
+        VertexPoint { id: self.ids.get(k), light: at(&self.light), bsdf: at(&self.bsdf) }
     }
 }
 

@@ -1,17 +1,20 @@
-//! Several samples of a light at infinity for one surface point: what [`Block::connect`] does for each, along columns.
+//! Several samples of a light at infinity for one surface point, and several scattered rays: what [`Block::connect`] and
+//! [`PathTracer::extend`] do for each, along columns.
 
-use super::Workspace;
 use super::depth::Block;
-use super::path::PathScratch;
+use super::path::{PathScratch, PathState, PathTracer};
 use super::pending::Pending;
+use super::strategy::MOST_SPLIT;
 use super::surface::{Surface, key};
+use super::{PathId, Workspace};
 use crate::base::directions::{DirectionLanes, LANES};
+use crate::base::lanes::{Columns, LANES as MANY};
 use crate::base::light::LightLanes;
 use crate::base::material::BsdfLanes;
 use crate::base::vertex::Vertex;
 use crate::color::Rgb;
 use crate::math::simd::{Kernel, dispatch};
-use crate::sampler::SHADOW_KEY;
+use crate::sampler::{Dim, SHADOW_KEY, Slot};
 use crate::sampling::mis::power;
 
 /// How many samples share the light of a surface point.
@@ -137,5 +140,60 @@ impl Block<'_> {
                 ask: Some(light),
             }));
         }
+    }
+}
+
+/// The points of some samples from one on, as many as any surface takes.
+#[inline]
+pub(super) fn draw(first: &PathId, dim: Dim) -> [[f32; LANES]; 2] {
+    const { assert!(MOST_SPLIT as usize <= LANES) };
+    first.sampler.few_2d(first.index, dim)
+}
+
+/// Lanes of rays from one point beside those of rays from many.
+fn widened(lanes: [f32; LANES]) -> [f32; MANY] {
+    const { assert!(LANES <= MANY) };
+    let mut out = [0.0; MANY];
+    out[..LANES].copy_from_slice(&lanes);
+    out
+}
+
+impl PathTracer {
+    /// `n` directions in which a path goes on that ends where they lead, so that nothing is left to chance (see
+    /// [`PathTracer::extend`]); each brings its share.
+    pub(super) fn extend_several(
+        &self,
+        block: &Block,
+        s: &Surface,
+        (n, guided_pdf): (u32, f32),
+        work: &mut Workspace,
+        paths: &mut PathScratch,
+    ) {
+        let id = paths.points.get(s.number).id;
+        let id = PathId { sampler: id.sampler.times(n), index: id.index.wrapping_mul(n), ..id };
+        let u = draw(&id, Dim::at(block.depth, Slot::BsdfUv)).map(widened);
+        let uc = match s.material.picks_lobe() {
+            true => widened(draw(&id, Dim::at(block.depth, Slot::LobeAndRoulette))[0]),
+            false => [0.0; MANY],
+        };
+        let wo = Columns(s.wo.to_array().map(|c| [c; MANY]));
+        let samples = s.material.sample_many(&s.prepared, &wo, &u, &uc, n as usize);
+        let before = paths.next.len();
+        for k in 0..n as usize {
+            let weight = Rgb::from(samples.weight.get(k).to_array());
+            let beta = s.state.beta * weight * (1.0 / n as f32);
+            let local = samples.wi.get(k);
+            let wi = s.v.frame.to_world(local);
+            if weight.is_black() || beta.is_black() || !s.v.is_consistent(wi) {
+                continue;
+            }
+            let id = PathId { index: id.index.wrapping_add(k as u32), ..id };
+            work.next.push(&s.v.spawn(wi, key(&id, block.depth + 1)));
+            let pdf = if samples.delta[k] { f32::INFINITY } else { samples.pdf[k] };
+            let eta2 = s.state.eta2 * s.look.transmission.map_or(1.0, |t| t.eta2(s.wo, local));
+            let (from, index) = (s.receiver, s.state.index);
+            paths.next.push(PathState { beta, pdf, from, guided_pdf, eta2, index });
+        }
+        work.avoided.absorbed += u64::from(n) - (paths.next.len() - before) as u64;
     }
 }

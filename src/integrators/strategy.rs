@@ -1,7 +1,5 @@
 //! How light at infinity is found from a surface: by asking the light, by going on as the surface scatters, or by both.
 
-use crate::base::vertex::Vertex;
-
 /// Most light samples of a surface point.
 pub const MOST_SPLIT: u8 = 8;
 
@@ -82,10 +80,10 @@ impl Strategies {
         all
     }
 
-    /// That of a surface point.
+    /// That of the points of an object's material.
     #[inline]
-    pub fn of(&self, v: &Vertex) -> Strategy {
-        let first = self.first_slot.get(v.object as usize).map_or(0, |f| *f as usize);
-        self.by_slot.get(first + v.slot as usize).copied().unwrap_or(self.usual)
+    pub fn of(&self, object: u32, slot: u32) -> Strategy {
+        let first = self.first_slot.get(object as usize).map_or(0, |f| *f as usize);
+        self.by_slot.get(first + slot as usize).copied().unwrap_or(self.usual)
     }
 }

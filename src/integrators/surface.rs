@@ -8,6 +8,7 @@ use super::depth::Block;
 use super::path::{PathScratch, PathState, PathTracer};
 use super::pending::Pending;
 use super::points::VertexPoint;
+use super::together::{Alike, Found};
 use super::{PathId, light_dim};
 use crate::base::lanes::LANES;
 use crate::base::light::{ChosenLight, LightSample, Receiver};
@@ -28,12 +29,13 @@ pub(super) struct Surface<'a> {
     /// Its number among the hits of the depth.
     pub(super) number: usize,
     pub(super) material: &'a dyn Material,
-    look: Look,
+    pub(super) look: Look,
     pub(super) prepared: Prepared,
     /// Local direction to the viewer.
     pub(super) wo: Vec3,
     pub(super) receiver: Receiver,
-    lit: Option<(ChosenLight, LightSample)>,
+    /// A sample of a light, which waits for its shadow ray.
+    pub(super) lit: Option<(ChosenLight, LightSample)>,
 }
 
 /// What is the same for all points of a material: asked for once, not at each.
@@ -41,7 +43,7 @@ pub(super) struct Surface<'a> {
 pub(super) struct Look {
     pub transmission: Option<Transmission>,
     is_black: bool,
-    is_delta: bool,
+    pub is_delta: bool,
     pub picks_lobe: bool,
 }
 
@@ -115,13 +117,8 @@ impl<'a> Surface<'a> {
 
 impl PathTracer {
     /// Puts out shadow rays, and the rays of the next depth.
-    pub(super) fn scatter(
-        &self,
-        block: &Block,
-        surfaces: &mut Vec<Surface>,
-        work: &mut Workspace,
-        paths: &mut PathScratch,
-    ) {
+    pub(super) fn scatter(&self, block: &Block, found: Found, work: &mut Workspace, paths: &mut PathScratch) {
+        let Found { surfaces, alike } = found;
         let all = surfaces.len();
         surfaces.retain(|s| !s.look.is_black);
         let black = (all - surfaces.len()) as u64;
@@ -133,12 +130,25 @@ impl PathTracer {
         for s in surfaces.iter_mut() {
             s.material.prepare(&s.v, &mut s.prepared);
         }
-        if let Some(guided) = block.guided {
-            for s in surfaces.iter() {
-                self.scatter_guided(block, guided, s, work, paths);
-            }
-            return;
+        let recorded = alike.as_ref().filter(|alike| alike.recorded);
+        match block.guided {
+            Some(guided) => self.scatter_guided(block, guided, (surfaces, recorded), work, paths),
+            None => self.scatter_plainly(block, (surfaces, recorded), work, paths),
         }
+        if let Some(alike) = alike.as_ref().filter(|alike| !alike.recorded) {
+            self.scatter_many(block, alike, work, paths);
+        }
+    }
+
+    /// The same below lights that do not take surfaces into account.
+    fn scatter_plainly(
+        &self,
+        block: &Block,
+        (surfaces, alike): (&mut [Surface], Option<&Alike>),
+        work: &mut Workspace,
+        paths: &mut PathScratch,
+    ) {
+        let shadow_rays = block.shadow_rays();
         let before = work.shadow.len();
         if block.samples_lights && block.each_light {
             for s in surfaces.iter().filter(|s| !s.look.is_delta) {
@@ -160,24 +170,29 @@ impl PathTracer {
         };
         work.avoided.scattered_alone += (surfaces.len() - asked) as u64 * shadow_rays;
         work.avoided.dark_samples += asked as u64 * shadow_rays - (work.shadow.len() - before) as u64;
-        for s in surfaces.iter() {
+        let (singles, many) = surfaces.split_at(surfaces.len() - alike.map_or(0, |alike| alike.n));
+        for s in singles {
             let point = paths.points.get(s.number);
-            self.extend(block, s, &point, work, paths, |_| 0.0);
+            self.extend(block, s, &point, 0.0, work, paths);
+        }
+        if let Some(alike) = alike {
+            self.extend_many(block, alike, (many, 0.0), work, paths);
         }
     }
 
-    /// The direction in which a path goes on, if it does, by the numbers of `point`. `guided_pdf` tells the density with which light samples find a direction on the guided light.
+    /// The direction in which a path goes on, if it does, by the numbers of `point`. `guided_pdf` is the density with which
+    /// light samples find it on the guided light, as far as that is known.
     #[inline]
     pub(super) fn extend(
         &self,
         block: &Block,
         s: &Surface,
         point: &VertexPoint,
+        guided_pdf: f32,
         work: &mut Workspace,
         paths: &mut PathScratch,
-        guided_pdf: impl Fn(Vec3) -> f32,
     ) {
-        let VertexPoint { id, bsdf, share, .. } = *point;
+        let VertexPoint { id, bsdf, .. } = *point;
         let roulette = block.depth >= self.roulette_depth && block.depth < self.max_depth;
         let lobe = if roulette || s.look.picks_lobe {
             id.sampler.get_2d(id.index, Dim::at(block.depth, Slot::LobeAndRoulette))
@@ -189,7 +204,7 @@ impl PathTracer {
             return;
         };
         let wi = s.v.frame.to_world(b.wi);
-        let mut beta = s.state.beta * b.weight * share;
+        let mut beta = s.state.beta * b.weight;
         if beta.is_black() || !s.v.is_consistent(wi) {
             work.avoided.absorbed += 1;
             return;
@@ -212,7 +227,7 @@ impl PathTracer {
             beta,
             pdf: if competes { b.pdf } else { f32::INFINITY },
             from: s.receiver,
-            guided_pdf: guided_pdf(wi),
+            guided_pdf,
             eta2,
             index: s.state.index,
         };

@@ -1,5 +1,6 @@
 //! The surface points of a depth, a few at a time.
 
+use super::depth::Block;
 use super::path::PathState;
 use super::surface::{LastLook, Plain, Surface};
 use crate::base::vertices::Vertices;
@@ -11,13 +12,14 @@ const FEW: usize = 4;
 
 /// The surface points of a depth, a few at a time.
 pub(super) struct Together<'a> {
+    block: &'a Block<'a>,
     surfaces: Vec<Surface<'a>>,
     vertices: Vertices,
     look: LastLook<'a>,
     /// Hits whose points have been here.
     done: usize,
-    /// Whether points that are alike stay in columns.
-    by_columns: bool,
+    /// Whether paths go on from them at all.
+    goes_on: bool,
 }
 
 /// Some points: each by itself, then some that are alike, if there are any.
@@ -26,7 +28,7 @@ pub(super) struct Found<'f, 'a> {
     pub alike: Option<Alike<'f, 'a>>,
 }
 
-/// Points of one plain material, still in columns.
+/// Points of one plain material, in columns.
 pub(super) struct Alike<'f, 'a> {
     pub vertices: &'f Vertices,
     pub plain: Plain<'a>,
@@ -34,6 +36,8 @@ pub(super) struct Alike<'f, 'a> {
     pub first: usize,
     /// How many.
     pub n: usize,
+    /// Whether they are the last of the surfaces as well, as lights are to be asked from each.
+    pub recorded: bool,
 }
 
 impl Alike<'_, '_> {
@@ -44,20 +48,20 @@ impl Alike<'_, '_> {
 }
 
 impl<'a> Together<'a> {
-    pub fn new(by_columns: bool) -> Self {
+    pub fn new(block: &'a Block<'a>, goes_on: bool) -> Self {
         let (surfaces, vertices) = (Vec::with_capacity(Surface::AT_ONCE), Vertices::default());
-        Together { surfaces, vertices, look: LastLook::default(), done: 0, by_columns }
+        Together { block, surfaces, vertices, look: LastLook::default(), done: 0, goes_on }
     }
 
     /// Goes on to the next of the hits, None at their end. `state` tells the path of a ray.
     #[inline]
     pub fn next(
         &mut self,
-        scene: &'a Scene,
         met: &Meetings,
         hits: &[u32],
         state: impl Fn(u32) -> PathState,
     ) -> Option<Found<'_, 'a>> {
+        let scene: &'a Scene = self.block.scene;
         self.surfaces.clear();
         self.surfaces.reserve(Surface::AT_ONCE);
         let end = hits.len().min(self.done + Surface::AT_ONCE);
@@ -65,9 +69,13 @@ impl<'a> Together<'a> {
         while self.done < end && alike.is_none() {
             let which = &hits[self.done..end];
             let n = scene.vertices(met, which, &mut self.vertices);
-            let slot = if self.by_columns && n >= FEW { self.vertices.look(n) } else { None };
-            alike = slot.and_then(|slot| self.look.plain(scene, slot)).map(|plain| (plain, self.done, n));
-            if alike.is_none() {
+            let slot = if self.goes_on && n >= FEW { self.vertices.look(n) } else { None };
+            alike = slot.and_then(|slot| {
+                let plain = self.look.plain(scene, slot)?;
+                let recorded = !self.block.goes_by_columns(slot, &plain.look);
+                Some((plain, self.done, n, recorded))
+            });
+            if alike.as_ref().is_none_or(|(.., recorded)| *recorded) {
                 // By an iterator of known length, each is made where it stays.
                 self.surfaces.extend(which[..n].iter().enumerate().map(|(lane, &i)| {
                     Surface::new(scene, &mut self.look, self.vertices.get(lane), state(i), self.done + lane)
@@ -76,7 +84,7 @@ impl<'a> Together<'a> {
             self.done += n;
         }
         let Together { surfaces, vertices, .. } = self;
-        let alike = alike.map(|(plain, first, n)| Alike { vertices, plain, first, n });
+        let alike = alike.map(|(plain, first, n, recorded)| Alike { vertices, plain, first, n, recorded });
         (!surfaces.is_empty() || alike.is_some()).then_some(Found { surfaces, alike })
     }
 }

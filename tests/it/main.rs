@@ -5,6 +5,7 @@ mod bad_geometry;
 mod bad_scenes;
 mod classic;
 mod cli;
+mod columns;
 mod common;
 mod convert;
 mod corpus;
