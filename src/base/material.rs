@@ -103,6 +103,16 @@ pub struct SampleLanes {
     pub delta: [bool; MANY],
 }
 
+impl SampleLanes {
+    /// One of them; None if the path ends there.
+    #[inline]
+    pub fn get(&self, lane: usize) -> Option<BsdfSample> {
+        let weight = Rgb::from(self.weight.get(lane).to_array());
+        let (wi, pdf, delta) = (self.wi.get(lane), self.pdf[lane], self.delta[lane]);
+        (!weight.is_black()).then_some(BsdfSample { wi, weight, pdf, delta })
+    }
+}
+
 /// Scattering and emission. All directions are local (z is the shading normal), of unit length and away from the
 /// surface; `wo` may lie below (z < 0) when the surface is seen from behind.
 pub trait Material: Send + Sync {
@@ -160,6 +170,11 @@ pub trait Material: Send + Sync {
             }
         }
         out
+    }
+
+    /// Whether [`Material::sample_many`] is faster than a call for each.
+    fn samples_together(&self) -> bool {
+        false
     }
 
     /// Reflectance for light from everywhere, seen from `wo`: an estimate good to some percent, for AOVs and

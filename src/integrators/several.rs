@@ -171,26 +171,31 @@ impl PathTracer {
     ) {
         let id = paths.points.get(s.number).id;
         let id = PathId { sampler: id.sampler.times(n), index: id.index.wrapping_mul(n), ..id };
-        let u = draw(&id, Dim::at(block.depth, Slot::BsdfUv)).map(widened);
+        let u = draw(&id, Dim::at(block.depth, Slot::BsdfUv));
         let uc = match s.material.picks_lobe() {
-            true => widened(draw(&id, Dim::at(block.depth, Slot::LobeAndRoulette))[0]),
-            false => [0.0; MANY],
+            true => draw(&id, Dim::at(block.depth, Slot::LobeAndRoulette))[0],
+            false => [0.0; LANES],
         };
-        let wo = Columns(s.wo.to_array().map(|c| [c; MANY]));
-        let samples = s.material.sample_many(&s.prepared, &wo, &u, &uc, n as usize);
+        let together = s.material.samples_together().then(|| {
+            let wo = Columns(s.wo.to_array().map(|c| [c; MANY]));
+            s.material.sample_many(&s.prepared, &wo, &u.map(widened), &widened(uc), n as usize)
+        });
+        let sample = |k: usize| match &together {
+            Some(lanes) => lanes.get(k),
+            None => s.material.sample(&s.prepared, s.wo, [u[0][k], u[1][k]], uc[k]),
+        };
         let before = paths.next.len();
         for k in 0..n as usize {
-            let weight = Rgb::from(samples.weight.get(k).to_array());
-            let beta = s.state.beta * weight * (1.0 / n as f32);
-            let local = samples.wi.get(k);
-            let wi = s.v.frame.to_world(local);
-            if weight.is_black() || beta.is_black() || !s.v.is_consistent(wi) {
+            let Some(b) = sample(k) else { continue };
+            let beta = s.state.beta * b.weight * (1.0 / n as f32);
+            let wi = s.v.frame.to_world(b.wi);
+            if beta.is_black() || !s.v.is_consistent(wi) {
                 continue;
             }
             let id = PathId { index: id.index.wrapping_add(k as u32), ..id };
             work.next.push(&s.v.spawn(wi, key(&id, block.depth + 1)));
-            let pdf = if samples.delta[k] { f32::INFINITY } else { samples.pdf[k] };
-            let eta2 = s.state.eta2 * s.look.transmission.map_or(1.0, |t| t.eta2(s.wo, local));
+            let pdf = if b.delta { f32::INFINITY } else { b.pdf };
+            let eta2 = s.state.eta2 * s.look.transmission.map_or(1.0, |t| t.eta2(s.wo, b.wi));
             let (from, index) = (s.receiver, s.state.index);
             paths.next.push(PathState { beta, pdf, from, guided_pdf, eta2, index });
         }

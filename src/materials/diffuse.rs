@@ -107,6 +107,10 @@ impl Material for Diffuse {
         out
     }
 
+    fn samples_together(&self) -> bool {
+        true
+    }
+
     fn scattering(&self, m: &Prepared) -> Option<Scattering> {
         let even = m.view::<Rgb>().luminance() * std::f32::consts::FRAC_1_PI;
         Some(Scattering { even, ..Scattering::EVEN })
