@@ -10,7 +10,6 @@ use crate::image::write::{check_file, write_file};
 use crate::math::aabb::DAabb;
 use crate::memory::in_words;
 use crate::render::backdrop::pays;
-use crate::render::coverage::Coverage;
 use crate::render::film::BYTES_PER_PIXEL;
 use crate::render::settings::RenderSettings;
 use crate::scene::build::{BuildOptions, build};
@@ -188,9 +187,8 @@ fn needs(features: &Features) -> Vec<&'static str> {
 fn skips(scene: &Scene, spp: Option<u32>) -> Vec<String> {
     let size = [scene.film.width, scene.film.height];
     let usual = RenderSettings::new(size);
-    let coverage = Coverage::of(scene, usual.crop, usual.filter, spp.unwrap_or(usual.spp));
-    let pays = |c: &Coverage| pays(scene, usual.filter, c, usual.crop, spp.unwrap_or(usual.spp));
-    let free = coverage.filter(pays).map_or(0.0, |c| c.free() as f64 / usual.crop.area() as f64);
+    let coverage = pays(scene, usual.filter, usual.crop, spp.unwrap_or(usual.spp));
+    let free = coverage.map_or(0.0, |c| c.free() as f64 / usual.crop.area() as f64);
     let (f, lights) = (&scene.features, &scene.lights);
     let mut out = Vec::new();
     if free > 0.0 {

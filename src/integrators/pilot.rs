@@ -30,9 +30,9 @@ const CANDIDATES: usize = 4;
 const MOST: usize = 384;
 /// Fewer say nothing.
 const LEAST: usize = 24;
-/// Fewer that a render affords are not worth what is made for their sake, whatever comes of it: tables of the sky for
-/// hundreds of directions, for each strategy others.
-const WORTHWHILE: usize = 192;
+/// Fewer that a render affords, of a tame light and of others, are not worth what is made for their sake whatever comes of
+/// it: tables of the sky for hundreds of directions, for each strategy others. Under tame lights there is most to be gained.
+const WORTHWHILE: [usize; 2] = [192, 768];
 /// Most part of a render's samples that is spent on trying.
 const SHARE: f64 = 0.02;
 /// Most camera rays that look for materials.
@@ -152,20 +152,21 @@ pub(super) fn choose(tracer: &PathTracer, scene: &Scene, plan: &PilotPlan) -> Op
     let samples = plan.pixels.area() as f64 * f64::from(plan.spp);
     let of_class = SAMPLES as usize * 2 * CANDIDATES;
     let affordable = (SHARE * samples / of_class as f64) as usize;
+    let tries = affordable >= WORTHWHILE[usize::from(!choices.is_tame)];
     let scouts = ((SHARE * samples) as usize).min(SCOUTS);
     if affordable >= LEAST {
         rays.camera += scout(scene, plan, scouts, &mut classes);
     }
     let most = (affordable / classes.list.len().max(1)).min(MOST);
     let mut bare = Bare::default();
-    if affordable >= WORTHWHILE && !plan.by_need {
+    if tries && !plan.by_need {
         let most = affordable.min(MOST);
         bare.add(tracer, scene, plan, (&classes.bare, most), 1);
         bare.add(tracer, scene, plan, (&classes.outlined, most), plan.outline_times);
     }
     rays.add(&bare.rays);
     for class in classes.list.iter_mut().filter(|c| !c.material.is_delta() && !c.material.is_black()) {
-        if affordable < WORTHWHILE || class.pixels.len().min(most) < LEAST {
+        if !tries || class.pixels.len().min(most) < LEAST {
             class.strategy = choices.usual(class.is_even);
             continue;
         }

@@ -11,7 +11,7 @@
 
 mod smooth;
 
-use super::coverage::Coverage;
+use super::coverage::{Coverage, LEAST_SPP};
 use super::film::TILE_SIDE;
 use crate::base::camera::FilmSamples;
 use crate::base::directions::Directions;
@@ -35,16 +35,32 @@ const TRIED: usize = 16;
 /// Samples whose rays cost as much as the lookups of a pixel, and as its share of a few points a tile.
 const WORTH: [u64; 2] = [12, 1];
 
-/// Whether integrals pay: whether of the pixels that see nothing enough can be taken. Some tiles tell, the same whatever the
-/// threads. Under a photograph of fine grain hardly a pixel is taken.
-pub fn pays(scene: &Scene, filter: PixelFilter, coverage: &Coverage, rect: PixelRect, spp: u32) -> bool {
-    let is_free = |(x, y): (u32, u32)| !coverage.is_covered(x, y);
-    let tiles: Vec<PixelRect> = rect.tiles(TILE_SIDE).filter(|tile| tile.pixels().any(&is_free)).collect();
+/// Which pixels see nothing, if integrals pay there: if of these pixels enough can be taken, and, which is found out first,
+/// of all as if nothing stood before them. Under a photograph of fine grain hardly one is. Some tiles tell, the same whatever
+/// the threads.
+pub fn pays(scene: &Scene, filter: PixelFilter, rect: PixelRect, spp: u32) -> Option<Coverage> {
+    scene.camera.projection()?;
+    if spp < LEAST_SPP || !pays_where(scene, filter, rect, spp, |_, _| true) {
+        return None;
+    }
+    let coverage = Coverage::of(scene, rect, filter, spp)?;
+    pays_where(scene, filter, rect, spp, |x, y| !coverage.is_covered(x, y)).then_some(coverage)
+}
+
+fn pays_where(
+    scene: &Scene,
+    filter: PixelFilter,
+    rect: PixelRect,
+    spp: u32,
+    is_free: impl Fn(u32, u32) -> bool,
+) -> bool {
+    let tiles: Vec<PixelRect> =
+        rect.tiles(TILE_SIDE).filter(|tile| tile.pixels().any(|(x, y)| is_free(x, y))).collect();
     let (mut spent, mut taken) = (0, 0);
     let mut backdrop = Backdrop::default();
     for tile in tiles.iter().step_by(tiles.len().div_ceil(TRIED).max(1)) {
         backdrop.fill(scene, filter, *tile);
-        for (x, y) in tile.pixels().filter(|p| is_free(*p)) {
+        for (x, y) in tile.pixels().filter(|&(x, y)| is_free(x, y)) {
             spent += WORTH[usize::from(backdrop.is_cheap)];
             taken += u64::from(backdrop.get(x, y).is_some());
         }

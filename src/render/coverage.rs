@@ -32,7 +32,7 @@ const FAN: usize = 8;
 /// Nanoseconds, roughly, of projecting a primitive, and of a sample that is saved: what is worth the trouble.
 const COSTS: [u64; 2] = [100, 45];
 /// Fewer samples of a pixel cost no more than the lookups that take their place.
-const LEAST_SPP: u32 = 16;
+pub const LEAST_SPP: u32 = 16;
 /// Boxes at least among which threads share the work of a shape, and in how many parts.
 const SHARED: usize = 32;
 /// See [`SHARED`].

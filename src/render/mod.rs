@@ -20,7 +20,6 @@ use crate::memory;
 use crate::scene::Scene;
 use adaptive::{Reached, Schedule, Task};
 use block::{BadSample, Job, Outlined, Worker};
-use coverage::Coverage;
 use dealing::Notes;
 use film::Film;
 use layers::Layers;
@@ -194,8 +193,7 @@ impl Renderer {
             None => self.integrator.clone(),
         };
         let skips = s.skip_background && s.spp > 1 && integrator.shows_background();
-        let coverage = if skips { Coverage::of(scene, crop, s.filter, s.spp) } else { None };
-        let coverage = coverage.filter(|c| backdrop::pays(scene, s.filter, c, crop, s.spp));
+        let coverage = if skips { backdrop::pays(scene, s.filter, crop, s.spp) } else { None };
         out.stats.free_pixels = coverage.as_ref().map_or(0, |c| c.free() as u64);
         let outlined = outlines.as_ref().map(|o| Outlined { pixels: o, points: s.outline_points(o.times()) });
         let job = Job {

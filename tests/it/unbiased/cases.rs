@@ -260,7 +260,7 @@ impl Plan {
 }
 
 /// Samples of a render that may take long: just enough for a pilot to try out materials.
-const LONG: u32 = 1088;
+const LONG: u32 = 4288;
 
 /// Something that is to change no mean.
 pub struct Technique {
