@@ -3,6 +3,7 @@
 
 use super::Workspace;
 use super::depth::Block;
+use super::guided::Rivals;
 use super::path::{PathScratch, PathState, PathTracer};
 use super::points::PointLanes;
 use super::strategy::Strategy;
@@ -15,19 +16,6 @@ use crate::base::vertices::Leaving;
 use crate::color::Rgb;
 use crate::math::simd::{Kernel, dispatch};
 use crate::sampler::{Dim, Slot, points_2d, ray_key};
-
-/// The lanes whose paths go on.
-pub(super) struct Kept {
-    order: [usize; LANES],
-    n: usize,
-}
-
-impl Kept {
-    /// In the order of their rays.
-    pub fn lanes(&self) -> &[usize] {
-        &self.order[..self.n]
-    }
-}
 
 impl Block<'_> {
     /// The path that a ray of this depth belongs to.
@@ -57,7 +45,7 @@ impl PathTracer {
         work.avoided.points += all;
         work.avoided.candidates += all * (shadow_rays + 1);
         work.avoided.scattered_alone += all * shadow_rays;
-        self.extend_many(block, alike, (&[], 0.0), work, paths);
+        self.extend_many(block, alike, (&[], &[]), work, paths);
     }
 
     /// As [`PathTracer::extend`]. `surfaces` are the records of the points, if they have any.
@@ -65,10 +53,10 @@ impl PathTracer {
         &self,
         block: &Block,
         alike: &Alike,
-        (surfaces, guided_pdf): (&[Surface], f32),
+        (surfaces, rivals): (&[Surface], &[Rivals]),
         work: &mut Workspace,
         paths: &mut PathScratch,
-    ) -> Kept {
+    ) {
         let Alike { vertices, plain, n, .. } = alike;
         let n = *n;
         let PathScratch { states, next, hits, points, .. } = paths;
@@ -113,7 +101,7 @@ impl PathTracer {
                 pdf: if competes & !samples.delta[lane] { samples.pdf[lane] } else { f32::INFINITY },
                 // Without records light samples have no density anywhere.
                 from: surfaces.get(lane).map_or(Receiver::NOWHERE, |s| s.receiver),
-                guided_pdf,
+                rivals: rivals.get(lane).copied().unwrap_or_default(),
                 index: before.index,
             });
             order[kept] = lane;
@@ -129,7 +117,6 @@ impl PathTracer {
         }
         work.avoided.absorbed += (n - kept - gambled) as u64;
         work.avoided.roulette += gambled as u64;
-        Kept { order, n: kept }
     }
 }
 

@@ -131,7 +131,7 @@ impl Block<'_> {
                 let state = &states[e.number as usize];
                 let end = PathEnd { wi: e.wi, vertex: None };
                 let pdf = || match self.guided {
-                    Some((guided, _)) if guided == light => state.guided_pdf,
+                    Some((index, guided)) if index == light => state.rivals.pdf(guided, &state.from, e.wi),
                     _ => self.light_pdf(light, &end, &state.from),
                 };
                 let weight = if state.pdf.is_finite() { self.weight(state, pdf()) } else { 1.0 };

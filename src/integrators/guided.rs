@@ -5,13 +5,14 @@ use super::depth::Block;
 use super::path::{PathScratch, PathTracer};
 use super::points::VertexPoint;
 use super::several::{Counts, draw};
-use super::strategy::{MOST_SPLIT, Strategy};
+use super::strategy::Strategy;
 use super::surface::Surface;
 use super::together::Alike;
 use super::{PathId, light_dim};
-use crate::base::light::{ChosenLight, Guide, GuidedLight, LightSample, Lobes};
+use crate::base::light::{ChosenLight, Guide, GuidedLight, LightSample, Lobes, Receiver};
 use crate::base::material::Scattering;
 use crate::sampler::{Dim, Slot};
+use glam::Vec3;
 
 /// So few samples are not worth being worked out together.
 const FEW: f32 = 2.0;
@@ -33,9 +34,29 @@ struct How {
     scattered: u32,
 }
 
+/// Light samples on the guided light that compete with a scattered ray. Their density is worked out where the ray finds the
+/// light, which many never do.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Rivals {
+    /// How many there are for each scattered ray: 0 if none, infinite where what the ray finds counts nothing.
+    times: f32,
+    /// What the light has worked out for the surface.
+    guide: Guide,
+}
+
+impl Rivals {
+    /// Their density per solid angle in a direction.
+    #[inline]
+    pub fn pdf(&self, light: &dyn GuidedLight, from: &Receiver, wi: Vec3) -> f32 {
+        if self.times == 0.0 || self.times == f32::INFINITY {
+            return self.times;
+        }
+        self.times * light.pdf(from, &self.guide, wi)
+    }
+}
+
 impl PathTracer {
-    /// Light samples or none, then the directions in which paths go on: as [`PathTracer::scatter`], with what the light
-    /// worked out for each surface still at hand when the density of such a direction is asked for. Each stage for all
+    /// Light samples or none, then the directions in which paths go on: as [`PathTracer::scatter`], but each stage for all
     /// surfaces, as they wait for tables that lie anywhere in memory: together, and not one after the other.
     pub(super) fn scatter_guided(
         &self,
@@ -70,66 +91,52 @@ impl PathTracer {
             block.count(how, work.shadow.len() - before, work);
         }
         let hows = &hows[..surfaces.len()];
-        self.go_on(block, guided, (surfaces, alike, hows), work, paths);
+        self.go_on(block, guided.0, (surfaces, alike, hows), work, paths);
     }
 
     /// The directions in which paths go on.
     fn go_on(
         &self,
         block: &Block,
-        (index, light): Guided,
+        index: u32,
         (surfaces, alike, hows): (&[Surface], Option<&Alike>, &[How]),
         work: &mut Workspace,
         paths: &mut PathScratch,
     ) {
+        let mut rivals = [Rivals::default(); Surface::AT_ONCE];
+        for (rivals, (how, s)) in rivals.iter_mut().zip(hows.iter().zip(surfaces)) {
+            *rivals = how.rivals(block.guided_pmf(index, s));
+        }
         // Those of one material have one strategy.
         let many = alike.filter(|_| hows.last().is_some_and(|how| how.scattered <= 1));
         let singles = surfaces.len() - many.map_or(0, |alike| alike.n);
-        let first = paths.next.len();
-        // Whose rays these are.
-        let mut owners = [0u8; Surface::AT_ONCE * MOST_SPLIT as usize];
         for (i, (how, s)) in hows.iter().zip(surfaces).enumerate().take(singles) {
             if how.ends(block) {
                 work.avoided.lit_alone += 1;
-                continue;
-            }
-            let before = paths.next.len() - first;
-            if how.scattered > 1 {
-                self.extend_several(block, s, (how.scattered, how.even_pdf()), work, paths);
+            } else if how.scattered > 1 {
+                self.extend_several(block, s, (how.scattered, rivals[i]), work, paths);
             } else {
-                self.extend(block, s, &paths.points.get(s.number), how.even_pdf(), work, paths);
+                self.extend(block, s, &paths.points.get(s.number), rivals[i], work, paths);
             }
-            owners[before..paths.next.len() - first].fill(i as u8);
         }
         match many.zip(hows.last()) {
             None => {}
             Some((alike, how)) if how.ends(block) => work.avoided.lit_alone += alike.n as u64,
-            Some((alike, how)) => {
-                let owners = &mut owners[paths.next.len() - first..];
-                let records = (&surfaces[singles..], how.even_pdf());
-                let kept = self.extend_many(block, alike, records, work, paths);
-                owners.iter_mut().zip(kept.lanes()).for_each(|(owner, lane)| *owner = (singles + lane) as u8);
-            }
-        }
-        for (k, &i) in (first..paths.next.len()).zip(&owners) {
-            let (s, how) = (&surfaces[usize::from(i)], &hows[usize::from(i)]);
-            if how.competes() {
-                let pdf = light.pdf(&s.receiver, &how.guide, work.next.direction(k));
-                paths.next[k].guided_pdf = block.guided_pmf(index, s) * pdf;
+            Some((alike, _)) => {
+                self.extend_many(block, alike, (&surfaces[singles..], &rivals[singles..]), work, paths);
             }
         }
     }
 }
 
 impl How {
-    /// Whether the density with which light samples find a scattered ray has to be asked for.
-    fn competes(&self) -> bool {
-        self.ready && matches!(self.strategy, Strategy::Both(_))
-    }
-
-    /// That density, if it is the same for all rays.
-    fn even_pdf(&self) -> f32 {
-        if self.strategy.is_light() { f32::INFINITY } else { 0.0 }
+    /// What scattered rays compete with, if the guided light is chosen with this probability.
+    fn rivals(&self, pmf: f32) -> Rivals {
+        match self.strategy {
+            Strategy::Light(_) => Rivals { times: f32::INFINITY, guide: self.guide },
+            Strategy::Both(_) if self.ready => Rivals { times: pmf, guide: self.guide },
+            Strategy::Both(_) | Strategy::Bsdf => Rivals::default(),
+        }
     }
 
     /// Whether light samples have counted all that scattered rays would find, and there is nothing else to be found.

@@ -3,6 +3,7 @@
 
 use super::depth::Block;
 use super::escapes::Escapes;
+use super::guided::Rivals;
 use super::pending::Pending;
 use super::points::VertexPoints;
 use super::strategy::{Strategies, Strategy};
@@ -129,9 +130,8 @@ pub(super) struct PathState {
     pub pdf: f32,
     /// Where the ray left, for the density of light samples; nowhere if none competes.
     pub from: Receiver,
-    /// Density with which light sampling found the direction on the guided light, if there is one; infinite where what it
-    /// shows there counts nothing.
-    pub guided_pdf: f32,
+    /// What it competes with on the guided light.
+    pub rivals: Rivals,
     /// Squared refractive index of the medium it travels in over that of the camera's.
     pub eta2: f32,
     /// Index into the block.
@@ -146,7 +146,7 @@ impl PathState {
             beta: Rgb::WHITE,
             pdf: f32::INFINITY,
             from: Receiver::NOWHERE,
-            guided_pdf: 0.0,
+            rivals: Rivals::default(),
             eta2: 1.0,
             index,
         }

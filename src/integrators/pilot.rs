@@ -4,7 +4,8 @@
 //! render will use, in two independent halves; their spread is the variance that the render would have, stratification,
 //! visibility and all. Rays are counted, not timed, so that the choice is a function of scene and seed. A material's
 //! strategy is the one that takes the least time to the same error. Materials that few of the pixels show keep to what is
-//! good in most scenes: light samples alone where they are known to scatter evenly, else scattered rays as well.
+//! good in most scenes: light samples alone where paths end at the first surface and that is known to scatter evenly, else
+//! scattered rays as well.
 
 use super::path::PathTracer;
 use super::strategy::{Strategies, Strategy};
@@ -69,7 +70,12 @@ impl Choices {
     fn new(tracer: &PathTracer, scene: &Scene, contrast: f32) -> Self {
         let (splits, ends) = (scene.lights.list.len() == 1, tracer.max_depth == 1);
         Choices {
-            even: Strategy::Light(if splits { 8 } else { 1 }),
+            even: match (ends, splits) {
+                (true, true) => Strategy::Light(8),
+                (true, false) => Strategy::Light(1),
+                // The ray that the path goes on by is there anyway, and finds what is wide.
+                (false, _) => Strategy::Both(1),
+            },
             others: Strategy::Both(if splits && ends { 4 } else { 1 }),
             is_tame: contrast <= TAME,
         }

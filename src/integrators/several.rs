@@ -2,6 +2,7 @@
 //! [`PathTracer::extend`] do for each, along columns.
 
 use super::depth::Block;
+use super::guided::Rivals;
 use super::path::{PathScratch, PathState, PathTracer};
 use super::pending::Pending;
 use super::strategy::MOST_SPLIT;
@@ -165,7 +166,7 @@ impl PathTracer {
         &self,
         block: &Block,
         s: &Surface,
-        (n, guided_pdf): (u32, f32),
+        (n, rivals): (u32, Rivals),
         work: &mut Workspace,
         paths: &mut PathScratch,
     ) {
@@ -197,7 +198,7 @@ impl PathTracer {
             let pdf = if b.delta { f32::INFINITY } else { b.pdf };
             let eta2 = s.state.eta2 * s.look.transmission.map_or(1.0, |t| t.eta2(s.wo, b.wi));
             let (from, index) = (s.receiver, s.state.index);
-            paths.next.push(PathState { beta, pdf, from, guided_pdf, eta2, index });
+            paths.next.push(PathState { beta, pdf, from, rivals, eta2, index });
         }
         work.avoided.absorbed += u64::from(n) - (paths.next.len() - before) as u64;
     }

@@ -5,6 +5,7 @@
 
 use super::Workspace;
 use super::depth::Block;
+use super::guided::Rivals;
 use super::path::{PathScratch, PathState, PathTracer};
 use super::pending::Pending;
 use super::points::VertexPoint;
@@ -173,22 +174,21 @@ impl PathTracer {
         let (singles, many) = surfaces.split_at(surfaces.len() - alike.map_or(0, |alike| alike.n));
         for s in singles {
             let point = paths.points.get(s.number);
-            self.extend(block, s, &point, 0.0, work, paths);
+            self.extend(block, s, &point, Rivals::default(), work, paths);
         }
         if let Some(alike) = alike {
-            self.extend_many(block, alike, (many, 0.0), work, paths);
+            self.extend_many(block, alike, (many, &[]), work, paths);
         }
     }
 
-    /// The direction in which a path goes on, if it does, by the numbers of `point`. `guided_pdf` is the density with which
-    /// light samples find it on the guided light, as far as that is known.
+    /// The direction in which a path goes on, if it does, by the numbers of `point`.
     #[inline]
     pub(super) fn extend(
         &self,
         block: &Block,
         s: &Surface,
         point: &VertexPoint,
-        guided_pdf: f32,
+        rivals: Rivals,
         work: &mut Workspace,
         paths: &mut PathScratch,
     ) {
@@ -227,7 +227,7 @@ impl PathTracer {
             beta,
             pdf: if competes { b.pdf } else { f32::INFINITY },
             from: s.receiver,
-            guided_pdf,
+            rivals,
             eta2,
             index: s.state.index,
         };
