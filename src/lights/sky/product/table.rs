@@ -175,17 +175,17 @@ fn rows(lit: &[u16], weights: &[f32], places: &Places) -> Option<[Vec<Piece>; RO
     }
     let (size, over_size) = (total / ROWS as f64, ROWS as f64 / total);
     let row_of = |at: f64| ((at * over_size) as usize).min(ROWS - 1);
-    let mut rows = std::array::from_fn(|_| Vec::with_capacity(lit.len() / (ROWS / 2)));
+    let mut rows: [Vec<Piece>; ROWS] = std::array::from_fn(|_| Vec::with_capacity(lit.len() / (ROWS / 2)));
     for cell in ordered(lit, &places.x) {
         let from = froms[cell as usize];
         let to = from + weight(cell);
-        let first = row_of(from);
+        let (first, last) = (row_of(from), row_of(to));
         let mut is_lost = true;
-        for row in first..=row_of(to) {
+        for (row, pieces) in (first..).zip(&mut rows[first..=last]) {
             let end = if row + 1 == ROWS { f64::INFINITY } else { (row + 1) as f64 * size };
             let weight = to.min(end) - from.max(row as f64 * size);
             if weight > 0.0 {
-                rows[row].push(Piece { cell, weight });
+                pieces.push(Piece { cell, weight });
                 is_lost = false;
             }
         }
