@@ -91,9 +91,9 @@ class Mitsuba:
         drjit.set_thread_count(threads)
         self.dr, self.mi, self.variant = drjit, mitsuba, variant
         self.program = f"Mitsuba {mitsuba.__version__} {variant}"
-        # The variants mean the same, and one of them is twenty times as slow.
+        # The variants mean the same.
         self.maker = f"Mitsuba {mitsuba.__version__} llvm_ad_rgb"
-        # Twenty times as slow: a few samples tell all that there is to say.
+        # It takes more than twice as long: a few samples tell all that there is to say.
         self.most = scalar_most if variant == "scalar_rgb" else 1 << 30
 
     def series(self):
