@@ -1,5 +1,5 @@
-//! Surface points of one plain material: what [`PathTracer::extend`] does for each, along columns, and where no light is
-//! sampled without a record of each.
+//! Surface points of one plain material: what [`PathTracer::extend`] does for each, along columns. Where no light is sampled
+//! there, the points have no records.
 
 use super::Workspace;
 use super::depth::Block;
@@ -26,7 +26,7 @@ impl Block<'_> {
 
     /// Whether points of an object's slot need no record: nothing is asked of each but where its path goes on.
     pub(super) fn goes_by_columns(&self, (object, slot): (u32, u32), look: &Look) -> bool {
-        // Beside other lights the guided one is left to scattered rays, they are not.
+        // Where there are other lights, these are sampled all the same.
         let left = || self.guided.is_some() && self.scene.lights.list.len() == 1;
         !self.samples_lights || look.is_delta || left() && self.strategies.of(object, slot) == Strategy::Bsdf
     }

@@ -38,7 +38,7 @@ struct How {
 /// light, which many never do.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Rivals {
-    /// How many there are for each scattered ray: 0 if none, infinite where what the ray finds counts nothing.
+    /// How many there are on average for each scattered ray: 0 if none, infinite where what the ray finds counts nothing.
     times: f32,
     /// What the light has worked out for the surface.
     guide: Guide,

@@ -31,8 +31,8 @@ const CANDIDATES: usize = 4;
 const MOST: usize = 384;
 /// Fewer say nothing.
 const LEAST: usize = 24;
-/// Fewer that a render affords, of a tame light and of others, are not worth what is made for their sake whatever comes of
-/// it: tables of the sky for hundreds of directions, for each strategy others. Under tame lights there is most to be gained.
+/// Pixels, over all materials, that a render must afford to try out for trials to be worth their tables of the sky, of
+/// hundreds of directions and for each strategy others: under a tame light, where there is most to be gained, and others.
 const WORTHWHILE: [usize; 2] = [192, 768];
 /// Most part of a render's samples that is spent on trying.
 const SHARE: f64 = 0.02;
@@ -100,6 +100,11 @@ impl Choices {
         }
         all
     }
+
+    /// Whether there is anything to be tried.
+    fn are_several(&self) -> bool {
+        [true, false].into_iter().any(|is_even| self.candidates(is_even).len() > 1)
+    }
 }
 
 /// A kind of surface: those that share a material.
@@ -158,7 +163,7 @@ pub(super) fn choose(tracer: &PathTracer, scene: &Scene, plan: &PilotPlan) -> Op
     let samples = plan.pixels.area() as f64 * f64::from(plan.spp);
     let of_class = SAMPLES as usize * 2 * CANDIDATES;
     let affordable = (SHARE * samples / of_class as f64) as usize;
-    let tries = affordable >= WORTHWHILE[usize::from(!choices.is_tame)];
+    let tries = affordable >= WORTHWHILE[usize::from(!choices.is_tame)] && choices.are_several();
     let scouts = ((SHARE * samples) as usize).min(SCOUTS);
     if affordable >= LEAST {
         rays.camera += scout(scene, plan, scouts, &mut classes);

@@ -35,37 +35,39 @@ const TRIED: usize = 16;
 /// Samples whose rays cost as much as the lookups of a pixel, and as its share of a few points a tile.
 const WORTH: [u64; 2] = [12, 1];
 
-/// Which pixels see nothing, if integrals pay there: if of these pixels enough can be taken, and, which is found out first,
-/// of all as if nothing stood before them. Under a photograph of fine grain hardly one is. Some tiles tell, the same whatever
-/// the threads.
+/// Which pixels see nothing, if integrals pay there: if of these pixels enough can be taken. It is found out first whether in
+/// any tile enough of all could be, as if nothing stood before them: under a photograph of fine grain hardly one can. Some
+/// tiles tell, the same whatever the threads.
 pub fn pays(scene: &Scene, filter: PixelFilter, rect: PixelRect, spp: u32) -> Option<Coverage> {
     scene.camera.projection()?;
-    if spp < LEAST_SPP || !pays_where(scene, filter, rect, spp, |_, _| true) {
+    let pays = |[spent, taken]: [u64; 2]| taken * u64::from(spp) >= spent;
+    if spp < LEAST_SPP || !tried(scene, filter, rect, |_, _| true).into_iter().any(pays) {
         return None;
     }
     let coverage = Coverage::of(scene, rect, filter, spp)?;
-    pays_where(scene, filter, rect, spp, |x, y| !coverage.is_covered(x, y)).then_some(coverage)
+    let free = tried(scene, filter, rect, |x, y| !coverage.is_covered(x, y));
+    let all = free.iter().fold([0; 2], |[a, b], [spent, taken]| [a + spent, b + taken]);
+    pays(all).then_some(coverage)
 }
 
-fn pays_where(
+/// Of some tiles, what the lookups of the pixels cost that are free, in samples, and how many can be taken.
+fn tried(
     scene: &Scene,
     filter: PixelFilter,
     rect: PixelRect,
-    spp: u32,
     is_free: impl Fn(u32, u32) -> bool,
-) -> bool {
+) -> Vec<[u64; 2]> {
     let tiles: Vec<PixelRect> =
         rect.tiles(TILE_SIDE).filter(|tile| tile.pixels().any(|(x, y)| is_free(x, y))).collect();
-    let (mut spent, mut taken) = (0, 0);
     let mut backdrop = Backdrop::default();
-    for tile in tiles.iter().step_by(tiles.len().div_ceil(TRIED).max(1)) {
+    let of_tile = |tile: &PixelRect| {
         backdrop.fill(scene, filter, *tile);
-        for (x, y) in tile.pixels().filter(|&(x, y)| is_free(x, y)) {
-            spent += WORTH[usize::from(backdrop.is_cheap)];
-            taken += u64::from(backdrop.get(x, y).is_some());
-        }
-    }
-    taken * u64::from(spp) >= spent
+        let free = tile.pixels().filter(|&(x, y)| is_free(x, y));
+        free.fold([0; 2], |[spent, taken], (x, y)| {
+            [spent + WORTH[usize::from(backdrop.is_cheap)], taken + u64::from(backdrop.get(x, y).is_some())]
+        })
+    };
+    tiles.iter().step_by(tiles.len().div_ceil(TRIED).max(1)).map(of_tile).collect()
 }
 
 /// Works out pixels; keeps its room from tile to tile.

@@ -81,7 +81,9 @@ fn place([x, y, z]: [f32; 3]) -> (u32, f32, f32) {
     let side =
         if x_major { 0 } else { 2 * SIDE_FACE as i32 } + if major < 0.0 { SIDE_FACE as i32 } else { 0 };
     let (base, rows) = if is_top { (TOP as i32, ACROSS as i32) } else { (side, UP as i32) };
-    let (i, j) = (u as i32, v as i32);
+    // What is next to nothing may have an infinite inverse.
+    let whole = |x: f32| if x > 0.0 { x as i32 } else { 0 };
+    let (i, j) = (whole(u), whole(v));
     let i = if i < ACROSS as i32 { i } else { ACROSS as i32 - 1 };
     let j = if j < rows { j } else { rows - 1 };
     let half = if y < 0.0 { HALF as i32 } else { 0 };

@@ -172,11 +172,15 @@ pub fn cases() -> Vec<Case> {
         Case::new("suns", &on_ground(&sky("midday"), rough, SUN), false, true, [0.08, 0.05]),
         Case::new("night", &on_ground(night, diffuse, &balls()), false, false, [0.12, 0.06]),
         Case::new("room", &room(), true, true, [0.08, 0.06]),
+        // Paths that end at the first surface have several samples there.
+        Case::new("direct", &on_ground(&sky("midday"), diffuse, ""), false, false, [0.05, 0.025]),
+        Case::new("direct metal", &on_ground(&sky("dusk"), metal, ""), false, false, [0.05, 0.03]),
     ];
     for case in &mut all {
         match case.name {
             "cube" => case.desc.sky.as_mut().unwrap().node = cube(),
             "glass" | "room" => case.max_depth = 8,
+            "direct" | "direct metal" => case.max_depth = 1,
             _ => {}
         }
         // The noisier ones.
@@ -302,6 +306,8 @@ pub fn techniques() -> Vec<Technique> {
         Technique {
             applies: |c| c.is_tame,
             least: 6,
+            // Noisy.
+            renders: 24,
             ..by("light_sampling off", |p| p.light_sampling = false)
         },
         Technique { applies: |c| c.has_choice, least: 3, ..by("each_light", |p| p.each_light = true) },
