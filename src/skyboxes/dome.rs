@@ -149,6 +149,17 @@ mod tests {
                 assert!(gap(d) < 1e-4, "{row} {i}: {d}");
             }
         }
+        for i in 0..8 {
+            let corner = Vec3::from([0, 1, 2].map(|axis| if i >> axis & 1 == 1 { 0.5 } else { -0.7 }));
+            let d = dome.radiance(corner);
+            // Of any length; two roundings of a position of up to 96.
+            for length in [1e-20, 1e20] {
+                let off = (dome.radiance(corner * length) - d).map(f32::abs).max_component();
+                assert!(off < 1e-4, "{corner} * {length}: {off}");
+            }
+            // Where the inverse is infinite the place is none, but one of the table's.
+            assert!((place((corner * 1e-39).to_array()).0 as usize) < dome.0.len() - STRIDE - 1);
+        }
         let mut rng = TestRng::new(1);
         for _ in 0..20_000 {
             let d = rng.direction();

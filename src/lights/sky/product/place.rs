@@ -4,7 +4,7 @@
 use super::table::{FIRST_BACK, SECOND_BACK, SWAPPED};
 use super::weigh::{Columns, larger};
 use crate::math::Frame;
-use crate::math::simd::Kernel;
+use crate::math::simd::{Kernel, dispatch};
 use glam::Vec3;
 
 /// Places are whole numbers, so that they can be sorted without a comparison; whatever of the plane is not before the
@@ -30,7 +30,7 @@ impl Places {
     pub fn new(cells: &Columns, axis: Vec3) -> Self {
         let n = cells.flux.len();
         let mut places = Places { x: vec![0; n], y: vec![0; n], lie: vec![0; n] };
-        crate::math::simd::dispatch(Plane { cells, frame: Frame::from_z(axis), places: &mut places });
+        dispatch(Plane { cells, frame: Frame::from_z(axis), places: &mut places });
         places
     }
 

@@ -303,6 +303,19 @@ mod tests {
     }
 
     #[test]
+    fn cells_are_sorted_by_place_and_then_by_number() {
+        let mut rng = TestRng::new(3);
+        for n in [0u16, 1, 2, 300, 1024] {
+            // Few places, so that many are alike, of both bytes.
+            let at: Vec<u16> = (0..n).map(|_| ((rng.bits() % 64) * 1021) as u16).collect();
+            let lit: Vec<u16> = (0..n).filter(|i| i % 3 != 1).collect();
+            let mut want = lit.clone();
+            want.sort_by_key(|&i| at[i as usize]);
+            assert_eq!(ordered(&lit, &at), want, "{n}");
+        }
+    }
+
+    #[test]
     fn numbers_are_shared_out_as_the_probabilities_say() {
         let mut rng = TestRng::new(5);
         for n in [1usize, 2, 31, 32, 33, 700, 1024] {
