@@ -69,7 +69,8 @@ struct SamplingArgs {
     /// everywhere [default: integrate]
     #[arg(long, value_name = "integrate|sample")]
     sky_pixels: Option<SkyPixels>,
-    /// Samples of pixels that outlines run through, at most, for each of another's (1: as many) [default: 4]
+    /// Samples of pixels that outlines run through, at most, for each of another's (1: as many) [default: 4, or 1
+    /// where paths go on or there are several lights]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_OUTLINES)))]
     outlines: Option<u32>,
     /// Which pixels the samples go to: those that need them, for what --spp samples of each would cost, or all as many
@@ -232,7 +233,7 @@ impl SamplingArgs {
             sampler: plan.sampler.unwrap_or(usual.sampler),
             filter: plan.filter.unwrap_or(usual.filter),
             skip_background: self.sky_pixels != Some(SkyPixels::Sample),
-            outlines: self.outlines.unwrap_or(usual.outlines),
+            outlines: self.outlines,
             by_need: self.dealing != Some(Dealing::Even),
             threads,
             moments: plan.output.moments,

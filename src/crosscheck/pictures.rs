@@ -75,7 +75,7 @@ pub(super) fn render(scene: &Scene, plan: &Plan, progress: &dyn Progress) -> Res
     let mut settings = plan.settings.clone();
     settings.time = None;
     // Every sample has the rays that were compared, by the integrator as it is.
-    (settings.skip_background, settings.pilot, settings.outlines) = (false, false, 1);
+    (settings.skip_background, settings.pilot, settings.outlines) = (false, false, Some(1));
     settings.by_need = false;
     let renderer = Renderer { integrator: Arc::clone(&plan.integrator), settings };
     Ok(renderer.render(scene, &Onward(progress))?.film)

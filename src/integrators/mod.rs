@@ -253,6 +253,12 @@ pub trait Integrator: Send + Sync {
         false
     }
 
+    /// Whether pixels that outlines run through are worth more camera rays: not where each brings along as much more work as
+    /// there are more of them.
+    fn gains_by_outlines(&self, _scene: &Scene) -> bool {
+        true
+    }
+
     /// An integrator of the same estimate that suits this scene better, decided by a pilot that is a function of its
     /// arguments alone; None where there is nothing to decide.
     fn specialise(&self, _scene: &Scene, _plan: &PilotPlan) -> Option<Specialised> {

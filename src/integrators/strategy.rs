@@ -43,6 +43,16 @@ impl Strategy {
         matches!(self, Strategy::Light(_))
     }
 
+    /// Whether a surface point that a camera ray meets takes several samples of the only light there is; `ends` says that
+    /// paths end there.
+    pub fn takes_several(self, ends: bool) -> bool {
+        match self {
+            Strategy::Light(n) => n > 1,
+            Strategy::Both(n) => n > 1 && ends,
+            Strategy::Bsdf => false,
+        }
+    }
+
     /// Its name.
     pub fn name(self) -> &'static str {
         Self::NAMES.iter().find(|n| n.1 == self).map_or("", |n| n.0)
@@ -78,6 +88,11 @@ impl Strategies {
             all.first_slot.push(all.by_slot.len() as u32);
         }
         all
+    }
+
+    /// That of what is in no table.
+    pub fn usual(&self) -> Strategy {
+        self.usual
     }
 
     /// That of the points of an object's material.

@@ -11,11 +11,16 @@
 //! Tried: a quarter of the samples first (what no neighbour foretells, a twig or a far lamp, costs more than is gained); all
 //! twelve neighbours alike (up to 1.2 times the error); the four nearest alone (8 times under the stars of `nebula`).
 
-use super::fixed::VALUE_LIMIT;
+mod dealer;
+mod note;
+mod trust;
+
+pub use note::{Kind, Note};
+
 use super::outlines::Outlines;
 use crate::base::pixel_rect::PixelRect;
-use crate::color::Rgb;
 use crate::integrators::{BARE_COST, RayCounts};
+use dealer::{Dealer, Floor, Guess};
 use rayon::prelude::*;
 
 /// Samples a pixel below which all get the same: half of fewer have no spread.
@@ -46,14 +51,6 @@ const NEAREST: usize = 4;
 /// What the others count: little, as need changes from pixel to pixel, but enough for one of very large variance, a star, to
 /// be noticed.
 const FAR: f32 = 1.0 / 32.0;
-/// Samples go as what they are worth to this power. Where squared errors fall as n^-a the best is 1 / (1 + a), the root for
-/// independent samples; less where worth is a guess and numbers are powers of two.
-const POWER: f64 = 0.4;
-/// Steps of a histogram for each doubling of the number of samples.
-const STEPS: f64 = 64.0;
-/// Doublings that the histogram covers, half of them below one sample.
-const DOUBLINGS: f64 = 128.0;
-
 /// Bytes for each pixel of the film: what it showed, what its neighbours say, and its number.
 pub const BYTES_PER_PIXEL: u64 = (size_of::<Note>() + size_of::<Guess>() + size_of::<u32>()) as u64;
 
@@ -65,64 +62,6 @@ pub fn first_samples(spp: u32) -> u32 {
 /// The power of two next to `spp`, in doublings.
 fn even_samples(spp: u32) -> u32 {
     1 << f64::from(spp.max(FIRST)).log2().round().min(31.0) as u32
-}
-
-/// What kind of pixel; neighbours of other kinds say little of it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Kind {
-    /// Not sampled: bare sky that was integrated.
-    #[default]
-    Bare,
-    /// As most.
-    Plain,
-    /// An outline runs through.
-    Outline,
-}
-
-/// What the first samples of a pixel showed.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Note {
-    /// Mean luminance.
-    mean: f32,
-    /// Variance of a sample, such that the mean of n has one n-th of it.
-    variance: f32,
-    /// Part that met a surface.
-    alpha: f32,
-    kind: Kind,
-}
-
-impl Note {
-    /// Of a pixel that needs no samples.
-    pub fn bare(radiance: Rgb) -> Self {
-        Note { mean: radiance.luminance(), ..Note::default() }
-    }
-
-    /// Of consecutive samples, a power of two of them from the first on. Points are stratified, so that the spread of single
-    /// samples says too much: it is that of the means of groups, each of about the root of their number.
-    pub fn of(li: &[Rgb], alpha: &[f32], kind: Kind) -> Self {
-        let n = li.len().max(1);
-        let group = 1usize << (n.ilog2() / 2);
-        // As the film takes them: what is no number is left out, what is too large is cut.
-        let luminance = |c: &Rgb| f64::from(c.luminance().min(VALUE_LIMIT));
-        let mean_of = |g: &[Rgb]| {
-            let (sum, n) =
-                g.iter().filter(|c| c.is_finite()).fold((0.0, 0.0), |(s, n), c| (s + luminance(c), n + 1.0));
-            (n > 0.0).then(|| sum / n)
-        };
-        let means = li.chunks(group).filter_map(mean_of);
-        let (mut sum, mut squares, mut groups) = (0.0, 0.0, 0.0);
-        for m in means {
-            (sum, squares, groups) = (sum + m, squares + m * m, groups + 1.0);
-        }
-        let mean = sum / f64::max(groups, 1.0);
-        let spread = (squares - sum * mean).max(0.0) / f64::max(groups - 1.0, 1.0);
-        Note {
-            mean: mean as f32,
-            variance: (spread * group as f64) as f32,
-            alpha: alpha.iter().sum::<f32>() / n as f32,
-            kind,
-        }
-    }
 }
 
 /// What was spent on pixels of one kind in the first part.
@@ -179,17 +118,6 @@ impl Counts {
     }
 }
 
-/// What the other colour's pixels around say of one.
-#[derive(Clone, Copy)]
-struct Guess {
-    /// The binary logarithm of how many samples it shall get, up to a constant.
-    share: f64,
-    /// What a sample costs.
-    cost: f64,
-    /// The fewest samples; 0 where none are needed.
-    least: u32,
-}
-
 impl Notes {
     /// Of a film, still empty.
     pub fn new(rect: PixelRect) -> Self {
@@ -216,19 +144,19 @@ impl Notes {
         let place = |at: usize| (self.rect.x0 + (at % width) as u32, self.rect.y0 + (at / width) as u32);
         let guess = |at: usize| {
             let (x, y) = place(at);
-            self.guess(x, y, means[colour(x, y)], costs, &dealer)
+            self.guess((x, y), &NEAR, means[colour(x, y)], costs, &dealer).0
         };
         let guesses: Vec<Guess> =
             (0..self.list.len()).into_par_iter().with_min_len(1 << 12).map(guess).collect();
-        let scale = |wanted: usize| {
+        let plan = |wanted: usize| {
             let rows = self.rect.pixels().zip(&guesses);
-            dealer.scale(rows.filter(|((x, y), _)| colour(*x, *y) == wanted).map(|(_, g)| g))
+            let trust = self.trust(1 - wanted, costs, &dealer);
+            dealer.plan(rows.filter(|((x, y), _)| colour(*x, *y) == wanted).map(|(_, g)| g), trust)
         };
-        let (white, black) = rayon::join(|| scale(0), || scale(1));
+        let (white, black) = rayon::join(|| plan(0), || plan(1));
         let count = |at: usize| {
             let (x, y) = place(at);
-            let g = &guesses[at];
-            dealer.count(g.share + [white, black][colour(x, y)], g.least)
+            dealer.count(&[white, black][colour(x, y)], &guesses[at])
         };
         let list = (0..guesses.len()).into_par_iter().with_min_len(1 << 12).map(count).collect();
         Counts { rect: self.rect, list, bare: spp }
@@ -249,31 +177,39 @@ impl Notes {
         sum / f64::max(n, 1.0)
     }
 
-    /// From the pixels of the other colour and the same kind that are near, or of any kind where there is none.
-    fn guess(&self, x: u32, y: u32, mean: f64, costs: [f64; 2], dealer: &Dealer) -> Guess {
+    /// From the pixels of the same kind at some places around, or of any kind where there is none; and what makes a variance
+    /// that pixel's error.
+    fn guess(
+        &self,
+        (x, y): (u32, u32),
+        near: &[(i32, i32)],
+        mean: f64,
+        costs: [f64; 2],
+        dealer: &Dealer,
+    ) -> (Guess, f64) {
         let own = self.list[self.rect.index(x, y)].kind;
         // What an outline hides, its neighbours do not show.
-        let (hit, times, least) = match own {
-            Kind::Bare => return Guess { share: 0.0, cost: 0.0, least: 0 },
-            Kind::Plain => (costs[0], 1.0, dealer.first),
-            Kind::Outline => (costs[1], dealer.times, even_samples(dealer.spp)),
+        let (hit, times, floor) = match own {
+            Kind::Bare => return (Guess::default(), 0.0),
+            Kind::Plain => (costs[0], 1.0, Floor::First),
+            Kind::Outline => (costs[1], dealer.times, Floor::Even),
         };
-        let [n, luminance, variance, alpha] = self.around(x, y, own);
+        let [n, luminance, variance, alpha] = self.around((x, y), near, own);
         if n == 0.0 {
-            return Guess { share: f64::NEG_INFINITY, cost: hit, least: even_samples(dealer.spp) };
+            return (Guess { worth: f32::NEG_INFINITY, cost: hit as f32, floor: Floor::Even }, 0.0);
         }
-        let scale = (luminance / n).powi(2) + EPSILON * mean * mean;
         // Of one sample, which of an outline is several.
-        let error = if variance > 0.0 { variance / n / scale / times } else { 0.0 };
+        let unit = 1.0 / (((luminance / n).powi(2) + EPSILON * mean * mean) * times);
+        let error = if variance > 0.0 { variance / n * unit } else { 0.0 };
         let cost = (1.0 - alpha / n).max(0.0) * BARE_COST * times + alpha / n * hit;
-        Guess { share: POWER * (error / cost).log2(), cost, least }
+        (Guess { worth: (error / cost).log2() as f32, cost: cost as f32, floor }, unit)
     }
 
     /// Sums over the neighbours that speak for a pixel of a kind, which are those of that kind or, where there is none, all:
     /// of their weights, and weighted of their means, variances, and parts that meet a surface.
-    fn around(&self, x: u32, y: u32, kind: Kind) -> [f64; 4] {
+    fn around(&self, (x, y): (u32, u32), near: &[(i32, i32)], kind: Kind) -> [f64; 4] {
         let [mut same, mut any] = [[0.0f32; 4]; 2];
-        for (k, (dx, dy)) in NEAR.iter().enumerate() {
+        for (k, (dx, dy)) in near.iter().enumerate() {
             let (i, j) = (x.wrapping_add_signed(*dx), y.wrapping_add_signed(*dy));
             if !self.rect.contains(i, j) {
                 continue;
@@ -295,58 +231,6 @@ impl Notes {
 /// White or black.
 fn colour(x: u32, y: u32) -> usize {
     ((x ^ y) & 1) as usize
-}
-
-/// How numbers come from shares.
-struct Dealer {
-    first: u32,
-    /// Whose cost may be spent.
-    spp: u32,
-    /// The binary logarithm of the most.
-    most: u32,
-    /// Camera rays of a sample of an outline.
-    times: f64,
-}
-
-impl Dealer {
-    /// The power of two that is nearest, where any are needed.
-    fn count(&self, share: f64, least: u32) -> u32 {
-        if least == 0 {
-            return 0;
-        }
-        (1u32 << share.round().clamp(0.0, f64::from(self.most)) as u32).max(least)
-    }
-
-    /// What is to be added to shares so that samples cost what `spp` of each would; less where no noise was seen.
-    fn scale<'a>(&self, guesses: impl Iterator<Item = &'a Guess>) -> f64 {
-        // Costs by share, for either of two floors.
-        let mut histogram = vec![[0.0; 2]; (DOUBLINGS * STEPS) as usize];
-        let (mut budget, last) = (0.0, histogram.len() as f64 - 1.0);
-        for g in guesses.filter(|g| g.least > 0) {
-            budget += g.cost * f64::from(self.spp);
-            if g.share == f64::NEG_INFINITY {
-                budget -= g.cost * f64::from(g.least);
-                continue;
-            }
-            let at = ((g.share + 0.5 * DOUBLINGS) * STEPS).clamp(0.0, last) as usize;
-            histogram[at][usize::from(g.least > self.first)] += g.cost;
-        }
-        let floors = [self.first, even_samples(self.spp)];
-        let bins: Vec<(f64, [f64; 2])> = (histogram.iter().enumerate())
-            .filter(|(_, costs)| costs[0] + costs[1] > 0.0)
-            .map(|(at, costs)| ((at as f64 + 0.5) / STEPS - 0.5 * DOUBLINGS, *costs))
-            .collect();
-        let of_bin = |share: f64, costs: &[f64; 2]| {
-            (0..2).map(|i| costs[i] * f64::from(self.count(share, floors[i]))).sum::<f64>()
-        };
-        let spent = |scale: f64| bins.iter().map(|(share, costs)| of_bin(share + scale, costs)).sum::<f64>();
-        let (mut low, mut high) = (-DOUBLINGS, DOUBLINGS);
-        for _ in 0..40 {
-            let middle = 0.5 * (low + high);
-            if spent(middle) > budget { high = middle } else { low = middle }
-        }
-        low
-    }
 }
 
 #[cfg(test)]

@@ -26,7 +26,7 @@ use layers::Layers;
 use outlines::Outlines;
 use rayon::prelude::*;
 use serde::Serialize;
-use settings::RenderSettings;
+use settings::{OUTLINES, RenderSettings};
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -172,7 +172,8 @@ impl Renderer {
             stats: RenderStats::default(),
         };
         // A single sample a pixel shows what lies in its middle.
-        let outlines = if s.spp > 1 { Outlines::of(scene, crop, s.outlines) } else { None };
+        let most = s.outlines.unwrap_or(if self.integrator.gains_by_outlines(scene) { OUTLINES } else { 1 });
+        let outlines = if s.spp > 1 { Outlines::of(scene, crop, most) } else { None };
         scene.kernel.take_failure()?;
         let is_outline = |x, y| outlines.as_ref().is_some_and(|o| o.contains(x, y));
         let plan = PilotPlan {

@@ -11,7 +11,7 @@ use crate::sampling::filter::PixelFilter;
 use crate::scene::desc::SceneDesc;
 use std::time::Duration;
 
-/// See [`RenderSettings::outlines`]: more would gain little, as the error of an edge falls as the power 1.5 of samples.
+/// What [`RenderSettings::outlines`] is where the integrator gains by it: more would gain little, as the error of an edge falls as the power 1.5 of samples.
 pub const OUTLINES: u32 = 4;
 /// Most of that.
 pub const MOST_OUTLINES: u32 = 64;
@@ -41,9 +41,9 @@ pub struct RenderSettings {
     /// Whether pixels that no geometry projects into get the filter's integral of what is behind everything, where that
     /// is known to a thousandth, instead of samples.
     pub skip_background: bool,
-    /// How many samples, at most, pixels that outlines run through take for each of another; 1 if no more. See
-    /// [`super::outlines`].
-    pub outlines: u32,
+    /// How many samples, at most, pixels that outlines run through take for each of another; 1 if no more; None for what is
+    /// best with the integrator. See [`super::outlines`].
+    pub outlines: Option<u32>,
     /// Whether pixels get samples by what they need, for the same cost in all, or all as many; see [`super::dealing`]. Takes
     /// [`super::dealing::LEAST_SPP`] samples, and does not go with `moments`, `target` or `time`, which deal by rounds.
     pub by_need: bool,
@@ -89,7 +89,7 @@ impl RenderSettings {
             sampler: Sampler::default(),
             filter: PixelFilter::default(),
             skip_background: true,
-            outlines: OUTLINES,
+            outlines: None,
             by_need: true,
             moments: false,
             pilot: true,
@@ -152,10 +152,9 @@ impl RenderSettings {
         if self.spp == 0 {
             return Err(Error::Usage("at least one sample a pixel is needed (--spp 1)".into()));
         }
-        if !(1..=MOST_OUTLINES).contains(&self.outlines) {
+        if let Some(times) = self.outlines.filter(|times| !(1..=MOST_OUTLINES).contains(times)) {
             return Err(Error::Usage(format!(
-                "pixels that outlines run through take 1 to {MOST_OUTLINES} times the samples of others, not {}",
-                self.outlines
+                "pixels that outlines run through take 1 to {MOST_OUTLINES} times the samples of others, not {times}"
             )));
         }
         self.target.map_or(Ok(()), |t| t.check())

@@ -60,7 +60,8 @@ pub fn render_rays(
     integrator: std::sync::Arc<dyn integrators::Integrator>,
     spp: u32,
 ) -> Rendered {
-    let settings = RenderSettings { spp, threads: 2, skip_background: false, outlines: 1, ..settings(scene) };
+    let settings =
+        RenderSettings { spp, threads: 2, skip_background: false, outlines: Some(1), ..settings(scene) };
     Renderer { integrator, settings }.render(scene, &Silent).unwrap()
 }
 

@@ -94,7 +94,8 @@ fn numbers_depend_on_no_thread() {
     assert_eq!([one.stats.spp_least, one.stats.spp], [two.stats.spp_least, two.stats.spp]);
     assert!(one.film == two.film, "the same film by one thread and by two");
     for (by_need, moments, spp) in [(false, false, 16), (true, true, 16), (true, false, 3)] {
-        let even = bench.render(|s| (s.by_need, s.moments, s.spp, s.outlines) = (by_need, moments, spp, 1));
+        let even =
+            bench.render(|s| (s.by_need, s.moments, s.spp, s.outlines) = (by_need, moments, spp, Some(1)));
         assert_eq!([even.stats.spp_least, even.stats.spp], [spp; 2], "{by_need} {moments} {spp}");
         assert!(even.film.window().pixels().all(|(x, y)| even.film.sample_count(x, y) == u64::from(spp)));
     }

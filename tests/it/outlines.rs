@@ -38,8 +38,8 @@ fn covered(r: &Rendered) -> f64 {
 #[test]
 fn the_mean_is_that_of_a_fixed_number_of_samples() {
     let s = scene(TEXT);
-    let want = mean(&render(&s, |s| (s.spp, s.outlines) = (512, 1)));
-    let rendered = render(&s, |s| (s.spp, s.outlines) = (512, 8));
+    let want = mean(&render(&s, |s| (s.spp, s.outlines) = (512, Some(1))));
+    let rendered = render(&s, |s| (s.spp, s.outlines) = (512, Some(8)));
     assert!(rendered.stats.outlines.pixels > 30 && rendered.stats.outlines.times == 8);
     let got = mean(&rendered);
     let sigma = want.error.hypot(got.error);
@@ -55,8 +55,9 @@ fn outlines_have_less_error_and_no_bias() {
     let truth = std::f64::consts::PI * radius * radius;
     let errors = |outlines: u32| -> Vec<f64> {
         let of = |seed: u64| {
-            covered(&render(&s, |s| (s.spp, s.outlines, s.seed, s.moments) = (4, outlines, seed, false)))
-                - truth
+            covered(&render(&s, |s| {
+                (s.spp, s.outlines, s.seed, s.moments) = (4, Some(outlines), seed, false)
+            })) - truth
         };
         (0..64).map(of).collect()
     };

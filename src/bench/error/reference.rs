@@ -88,7 +88,7 @@ impl Reference {
         settings.seed = SEED;
         // What is on trial does not stand as judge.
         settings.skip_background = false;
-        settings.outlines = 1;
+        settings.outlines = Some(1);
         settings.by_need = false;
         settings.moments = true;
         let renderer = Renderer { integrator: renderer.integrator.clone(), settings };

@@ -56,7 +56,7 @@ pub static KEYS: &[Key] = &[
     }),
     Key::new("outlines", "samples of outlines for each of other pixels", |s, v| {
         let number = |_| Error::Usage(format!("outlines take a number of samples, not \"{v}\""));
-        s.settings.outlines = v.parse().map_err(number)?;
+        s.settings.outlines = Some(v.parse().map_err(number)?);
         s.settings.check()
     }),
     Key::new("dealing", "samples by need, or as many for each pixel", |s, v| {

@@ -1,4 +1,5 @@
 use super::*;
+use crate::color::Rgb;
 use crate::testing::TestRng;
 
 const RECT: PixelRect = PixelRect::new(7, 4, 71, 52);
@@ -16,11 +17,12 @@ fn plain(mean: f32, variance: f32) -> Note {
     Note { mean, variance, alpha: 1.0, kind: Kind::Plain }
 }
 
+/// Noise comes and goes over some pixels, and varies from one to the next.
 fn random(seed: u64) -> Notes {
     let mut rng = TestRng::new(seed);
-    notes(|_, _| Note {
+    notes(|x, y| Note {
         kind: [Kind::Plain, Kind::Plain, Kind::Outline, Kind::Bare][(rng.bits() % 4) as usize],
-        ..plain(rng.f32(), rng.f32().powi(8))
+        ..plain(0.5 + rng.f32(), rng.f32() * (5.0 * ((x + 2 * y) as f32 / 9.0).sin()).exp2())
     })
 }
 
@@ -42,9 +44,9 @@ fn a_pixel_has_no_say_in_its_own_number() {
 
 #[test]
 fn all_cost_what_was_asked_for() {
-    let alike = |spp: u32, variance: &dyn Fn(&mut TestRng) -> f32| {
-        let mut rng = TestRng::new(u64::from(spp));
-        let counts = notes(|_, _| plain(1.0, variance(&mut rng))).deal(first_samples(spp), spp, None);
+    let alike = |spp: u32, variance: &dyn Fn(f32) -> f32| {
+        let row = |x: u32, y: u32| x as f32 + y as f32 / 64.0;
+        let counts = notes(|x, y| plain(1.0, variance(row(x, y) / 72.0))).deal(first_samples(spp), spp, None);
         let numbers = || RECT.pixels().map(|(x, y)| counts.of(x, y));
         let mean = numbers().map(f64::from).sum::<f64>() / RECT.area() as f64;
         (numbers().min().unwrap(), mean, numbers().max().unwrap())
@@ -52,7 +54,7 @@ fn all_cost_what_was_asked_for() {
     for spp in [4, 5, 8, 16, 100, 1024] {
         // Where pixels want their shares of what is left, numbers are powers of two, as the sum comes out. By far the most
         // pixels differ in their worth, so that a step of the scale moves few of them.
-        let (least, mean, most) = alike(spp, &|rng| rng.f32().powi(6));
+        let (least, mean, most) = alike(spp, &|u| u.powi(6));
         // Bins of the histogram are 1/64 of an octave, and not all pixels lie within one octave: half of a bin that is
         // doubled by mistake is less than a hundredth of them.
         assert!(mean <= 1.01 * f64::from(spp) && mean > 0.95 * f64::from(spp), "{spp}: {mean}");
@@ -67,32 +69,55 @@ fn all_cost_what_was_asked_for() {
 
 #[test]
 fn numbers_go_by_noise_and_cost() {
-    // The right half has 32 times the variance, to the power 0.4 that is 4. Away from the border that is seen alone.
-    let counts = notes(|x, _| plain(1.0, if x < 40 { 1.0 } else { 32.0 })).deal(8, 32, None);
-    assert_eq!(
-        [counts.of(20, 20), counts.of(60, 20)]
-            .map(f64::from)
-            .map(f64::log2)
-            .map(|l| l - f64::from(counts.of(20, 20)).log2()),
-        [0.0, 2.0]
-    );
-    // The same noise of a pixel 2^1.25 times as dark counts 2^2.5 times as much: to the power 0.4 that is one doubling, or
-    // 1 % less by what is added to dark pixels' squares. Variances of all sizes, so that rounding is evened out; a half has
-    // some 900 pixels whose numbers spread by one doubling, four of which share what they go by.
-    let mut rng = TestRng::new(9);
-    let counts = notes(|x, _| plain(if x < 40 { 1.25f32.exp2() } else { 1.0 }, (8.0 * rng.f32()).exp2()))
-        .deal(1, 64, None);
-    let mean = |columns: std::ops::Range<u32>| {
-        let numbers = columns.flat_map(|x| (8..48).map(move |y| (x, y)));
-        let logs: Vec<f64> = numbers.map(|(x, y)| f64::from(counts.of(x, y)).log2()).collect();
-        logs.iter().sum::<f64>() / logs.len() as f64
+    // Variances of eight octaves from the first row to the last, so that rounding to powers of two is evened out; and away
+    // from the border between the halves, as the right one differs.
+    let variance = |y: u32| (8.0 * y as f32 / 52.0).exp2();
+    let doublings = |note: &dyn Fn(bool, f32) -> Note| {
+        let counts = notes(|x, y| note(x >= 40, variance(y))).deal(1, 64, None);
+        let mean = |columns: std::ops::Range<u32>| {
+            let numbers = columns.flat_map(|x| (8..48).map(move |y| (x, y)));
+            let logs: Vec<f64> = numbers.map(|(x, y)| f64::from(counts.of(x, y)).log2()).collect();
+            logs.iter().sum::<f64>() / logs.len() as f64
+        };
+        mean(43..68) - mean(10..37)
     };
-    let doublings = mean(43..68) - mean(10..37);
-    assert!((doublings - 0.99).abs() < 0.25, "{doublings}");
+    // 32 times the variance, to the power 0.4, is two doublings. A row in forty has one number for all of a half, and a step
+    // of a doubling somewhere else than the other half: within two rows.
+    let noisy = doublings(&|right, variance| plain(1.0, if right { 32.0 } else { 1.0 } * variance));
+    assert!((noisy - 2.0).abs() < 0.05, "{noisy}");
+    // The same noise of a pixel 2^1.25 times as dark counts 2^2.5 times as much: to the power 0.4 that is one doubling, or
+    // 1 % less by what is added to dark pixels' squares.
+    let dark = doublings(&|right, variance| plain(if right { 1.0 } else { 1.25f32.exp2() }, variance));
+    assert!((dark - 0.99).abs() < 0.05, "{dark}");
     // Samples that mostly meet nothing are cheap.
-    let half = |x: u32| if x < 40 { 1.0 } else { 0.01 };
-    let counts = notes(|x, _| Note { alpha: half(x), ..plain(1.0, 1.0) }).deal(8, 32, None);
-    assert!(counts.of(60, 20) >= 4 * counts.of(20, 20), "{} {}", counts.of(60, 20), counts.of(20, 20));
+    let cheap =
+        doublings(&|right, variance| Note { alpha: if right { 0.01 } else { 1.0 }, ..plain(1.0, variance) });
+    assert!(cheap > 1.0, "{cheap}");
+}
+
+#[test]
+fn what_neighbours_do_not_foretell_is_not_gone_by() {
+    // Variances of sixteen octaves, each pixel's its own: in truth as many samples everywhere are best.
+    let mut rng = TestRng::new(10);
+    let mut chance = |_: u32, _: u32| plain(1.0, (16.0 * rng.f32()).exp2());
+    for spp in [4, 16, 50] {
+        let counts = notes(&mut chance).deal(first_samples(spp), spp, None);
+        assert!(RECT.pixels().all(|(x, y)| counts.of(x, y) == spp), "{spp}");
+    }
+    // One colour of the chessboard shows where noise is, the other is alike all over: only the former is believed, which is
+    // what the other's numbers go by.
+    let variance = |y: u32| (12.0 * y as f32 / 52.0).exp2();
+    let counts =
+        notes(|x, y| plain(1.0, if colour(x, y) == 0 { variance(y) } else { 1.0 })).deal(8, 16, None);
+    let numbers = |wanted: usize| {
+        let mut all: Vec<u32> =
+            RECT.pixels().filter(|p| colour(p.0, p.1) == wanted).map(|(x, y)| counts.of(x, y)).collect();
+        all.sort_unstable();
+        all.dedup();
+        all
+    };
+    assert_eq!(numbers(0), [16]);
+    assert!(numbers(1).len() > 1, "{:?}", numbers(1));
 }
 
 #[test]

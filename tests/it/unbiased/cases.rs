@@ -214,7 +214,7 @@ impl Plan {
                 spp: case.spp,
                 sampler: Sampler::Independent,
                 skip_background: false,
-                outlines: 1,
+                outlines: Some(1),
                 by_need: false,
                 moments: false,
                 pilot: false,
@@ -320,7 +320,7 @@ pub fn techniques() -> Vec<Technique> {
             8,
         ),
         seen(by("roulette", |p| p.roulette_depth = 2), |s| s.avoided.roulette > 0, 10),
-        seen(by("outlines", |p| p.settings.outlines = 4), |s| s.outlines.pixels > 0, 8),
+        seen(by("outlines", |p| p.settings.outlines = Some(4)), |s| s.outlines.pixels > 0, 8),
         seen(
             Technique {
                 renders: 30,
