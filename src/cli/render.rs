@@ -73,9 +73,10 @@ struct SamplingArgs {
     /// where paths go on or there are several lights]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_OUTLINES)))]
     outlines: Option<u32>,
-    /// Which pixels the samples go to: those that need them, for what --spp samples of each would cost, or all as many
+    /// Which pixels the samples go to: those that need them, for what --spp samples of each would cost, as far as their need
+    /// can be foretold (by-guess: as if that were certain), or all as many
     /// [default: by-need; even below 4 samples, and where --time, a target, --denoise or --aov variance take two sets of points]
-    #[arg(long, value_name = "by-need|even")]
+    #[arg(long, value_name = "by-need|by-guess|even")]
     dealing: Option<Dealing>,
     /// Seed of every random choice [default: 0]
     #[arg(long, value_name = "N")]
@@ -123,6 +124,7 @@ enum SkyPixels {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Dealing {
     ByNeed,
+    ByGuess,
     Even,
 }
 
@@ -235,6 +237,7 @@ impl SamplingArgs {
             skip_background: self.sky_pixels != Some(SkyPixels::Sample),
             outlines: self.outlines,
             by_need: self.dealing != Some(Dealing::Even),
+            doubts: self.dealing != Some(Dealing::ByGuess),
             threads,
             moments: plan.output.moments,
             aovs: plan.output.aovs.clone(),

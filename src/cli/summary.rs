@@ -160,7 +160,11 @@ impl Record {
             spp: if settings.deals() { settings.spp } else { stats.spp },
             seed: settings.seed,
             sampler: settings.points().kind().name(),
-            dealing: if settings.deals() { "by-need" } else { "even" },
+            dealing: match (settings.deals(), settings.doubts) {
+                (true, true) => "by-need",
+                (true, false) => "by-guess",
+                (false, _) => "even",
+            },
             filter: settings.filter.name(),
             scene: Contents::new(&scene.report, scene.lights.list.len()),
             seconds: Seconds {

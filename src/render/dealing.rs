@@ -18,6 +18,7 @@ mod trust;
 pub use note::{Kind, Note};
 
 use super::outlines::Outlines;
+use super::settings::RenderSettings;
 use crate::base::pixel_rect::PixelRect;
 use crate::integrators::{BARE_COST, RayCounts};
 use dealer::{Dealer, Floor, Guess};
@@ -132,8 +133,9 @@ impl Notes {
         self.spent.add(spent);
     }
 
-    /// How many samples each pixel gets in all, after `first` of each, for the cost of `spp` of each.
-    pub fn deal(&self, first: u32, spp: u32, outlines: Option<&Outlines>) -> Counts {
+    /// How many samples each pixel gets in all, after `first` of each, for the cost of as many of each as the settings say.
+    pub fn deal(&self, first: u32, settings: &RenderSettings, outlines: Option<&Outlines>) -> Counts {
+        let spp = settings.spp;
         let times = outlines.map_or(1, Outlines::times);
         let plain = self.cost(Kind::Plain, &self.spent.plain, 1);
         let costs = [plain, self.cost(Kind::Outline, &self.spent.outlines, times)];
@@ -150,7 +152,7 @@ impl Notes {
             (0..self.list.len()).into_par_iter().with_min_len(1 << 12).map(guess).collect();
         let plan = |wanted: usize| {
             let rows = self.rect.pixels().zip(&guesses);
-            let trust = self.trust(1 - wanted, costs, &dealer);
+            let trust = if settings.doubts { self.trust(1 - wanted, costs, &dealer) } else { 1.0 };
             dealer.plan(rows.filter(|((x, y), _)| colour(*x, *y) == wanted).map(|(_, g)| g), trust)
         };
         let (white, black) = rayon::join(|| plan(0), || plan(1));

@@ -282,7 +282,7 @@ fn dealt(job: &Job, workers: &Mutex<Vec<Worker>>, out: &mut Rendered, progress: 
     if out.stats.interrupted {
         return Ok(());
     }
-    let counts = notes.deal(first, spp, job.outlines.map(|o| o.pixels));
+    let counts = notes.deal(first, job.settings, job.outlines.map(|o| o.pixels));
     drop(notes);
     let rest = Job { counts: Some(&counts), ..*job };
     let done = render_round(&rest, &tasks(first..counts.most().max(first)), workers, out, None, progress)?;

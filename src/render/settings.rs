@@ -47,6 +47,9 @@ pub struct RenderSettings {
     /// Whether pixels get samples by what they need, for the same cost in all, or all as many; see [`super::dealing`]. Takes
     /// [`super::dealing::LEAST_SPP`] samples, and does not go with `moments`, `target` or `time`, which deal by rounds.
     pub by_need: bool,
+    /// Whether what pixels need is believed only as far as it was foretold for others, down to not at all; see
+    /// [`super::dealing`].
+    pub doubts: bool,
     /// Whether the film shall know how large its error is: each pixel's samples are then two independent randomisations,
     /// which are less even together than one. Targets and time limits ask for that by themselves.
     pub moments: bool,
@@ -91,6 +94,7 @@ impl RenderSettings {
             skip_background: true,
             outlines: None,
             by_need: true,
+            doubts: true,
             moments: false,
             pilot: true,
             threads: std::thread::available_parallelism().map_or(1, |n| n.get()),

@@ -60,7 +60,8 @@ pub static KEYS: &[Key] = &[
         s.settings.check()
     }),
     Key::new("dealing", "samples by need, or as many for each pixel", |s, v| {
-        s.settings.by_need = choose("dealing", v, &[("by-need", true), ("even", false)])?;
+        let all = [("by-need", (true, true)), ("by-guess", (true, false)), ("even", (false, true))];
+        (s.settings.by_need, s.settings.doubts) = choose("dealing", v, &all)?;
         Ok(())
     }),
     Key::new("moments", "whether a render knows its own error", |s, v| {

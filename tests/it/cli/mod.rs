@@ -53,7 +53,9 @@ fn lists_completions_and_manual_are_printed() {
 #[test]
 fn pictures_and_statistics_are_written() {
     let f = Folder::new();
-    let run = f.run("render scene.toml -o a.exr -o b.png --aov albedo,normal --stats s.json").succeeds();
+    let run = f
+        .run("render scene.toml -o a.exr -o b.png --aov albedo,normal --outlines 4 --stats s.json")
+        .succeeds();
     assert_eq!(run.stdout, "");
     assert!(run.stderr.contains("2 triangles") && run.stderr.contains("Mrays/s"), "{}", run.stderr);
     let stats = f.json("s.json");

@@ -332,9 +332,15 @@ pub fn techniques() -> Vec<Technique> {
             |s| s.spared > 0,
             8,
         ),
-        seen(by("dealing by need", |p| p.settings.by_need = true), by_need, 10),
+        seen(
+            by("dealing by guess", |p| (p.settings.by_need, p.settings.doubts) = (true, false)),
+            by_need,
+            10,
+        ),
+        // In the others what neighbours show foretells nothing.
+        seen(by("dealing by need", |p| p.settings.by_need = true), by_need, 7),
         seen(Technique { renders: 10, ..by("target", |p| p.set_target(p.targets[0])) }, by_need, 8),
-        seen(by("all defaults", Plan::set_defaults), by_need, 10),
+        seen(by("all defaults", Plan::set_defaults), |s| s.rounds == 2, 10),
         seen(
             Technique {
                 renders: 10,
