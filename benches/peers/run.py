@@ -5,8 +5,9 @@
 
 Each renderer runs in a process of its own, one after the other, and writes OUTDIR/NAME.json; then all records that stand
 in OUTDIR are drawn as OUTDIR/all.html and all.txt, a plot of each scene as SCENE.svg. Where one fails, the others go on.
-Other options (--spp, --replicates, --reference-spp, --threads, --size) are handed on as they are. References are kept in
-DIR/references.
+Where one of --spp, --replicates and --reference-spp is not given, each renderer takes what is good for it (see LADDERS): all
+in all an hour or so, where references are kept. They are in DIR/references. --threads and --size are handed on as they are.
+With --keep, what OUTDIR has already is not measured again, so that a run goes on where it was stopped.
 
 Peers that need another Python than this one: --python cycles=PROGRAM, as often as needed.
 """
@@ -25,6 +26,14 @@ PEERS = {
     "cycles": [["cycles", "peer_cycles.py"]],
     "lux": [["lux", "peer_lux.py"]],
 }
+# Samples a pixel, runs of each, and samples of references: slow ones take fewer, as far as errors of 5 to 1 % need.
+LADDERS = {
+    "skylit": ("1,4,16,64", 8, 1024),
+    "mitsuba": ("1,4,16,64,256", 4, 4096),
+    "mitsuba-scalar": ("1,4,16", 3, 256),
+    "cycles": ("1,4,16,64", 3, 512),
+    "lux": ("4,16,64", 2, 512),
+}
 
 
 def arguments():
@@ -34,12 +43,20 @@ def arguments():
     p.add_argument("--peers", default=",".join(PEERS))
     p.add_argument("--scenes", help="default: all that are in DIR")
     p.add_argument("--skylit", default="target/release/skylit", metavar="PROGRAM")
+    p.add_argument("--keep", action="store_true", help="leave records that stand in OUTDIR as they are")
     p.add_argument("--python", action="append", default=[], metavar="PEER=PROGRAM")
     a, rest = p.parse_known_args()
     for name in a.peers.split(","):
         if name not in PEERS:
             p.error(f"unknown peer {name}; known: {', '.join(PEERS)}")
     return a, rest
+
+
+def ladder(peer, rest):
+    """What is not among the options that were given."""
+    given = {word.split("=")[0] for word in rest}
+    usual = zip(("--spp", "--replicates", "--reference-spp"), LADDERS[peer])
+    return [str(word) for option in usual if option[0] not in given for word in option]
 
 
 def all_scenes(folder):
@@ -74,7 +91,10 @@ def main():
     failed = []
     for peer in a.peers.split(","):
         for record, *script in PEERS[peer]:
-            out = ["--json", os.path.join(a.json, f"{record}.json")]
+            path = os.path.join(a.json, f"{record}.json")
+            if a.keep and os.path.exists(path):
+                continue
+            out = ["--json", path, *ladder(peer, rest)]
             if peer == "skylit":
                 files = [os.path.join(a.dir, f"{name}.toml") for name in names or all_scenes(a.dir)]
                 kept = ["--references", os.path.join(a.dir, "references")]

@@ -71,6 +71,23 @@ fn outlines_have_less_error_and_no_bias() {
 }
 
 #[test]
+fn more_are_taken_where_samples_of_light_are_shared() {
+    let s = scene(TEXT);
+    let found = |kind: &str, params: &[(&str, f64)], outlines: Option<u32>| {
+        let settings = RenderSettings { spp: 8, outlines, ..settings(&s) };
+        let r = Renderer { integrator: integrator(kind, params), settings }.render(&s, &Silent).unwrap();
+        r.stats.outlines.pixels > 0
+    };
+    assert!(
+        found("direct", &[], None)
+            && found("path", &[("max_depth", 1.0)], None)
+            && found("normals", &[], None)
+    );
+    assert!(!found("path", &[], None) && !found("direct", &[("light_sampling", 0.0)], None));
+    assert!(found("path", &[], Some(4)), "it was asked for");
+}
+
+#[test]
 fn a_single_sample_and_a_lens_have_none() {
     let s = scene(TEXT);
     assert_eq!(render(&s, |s| s.spp = 1).stats.outlines.pixels, 0);
