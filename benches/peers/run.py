@@ -5,9 +5,10 @@
 
 Each renderer runs in a process of its own, one after the other, and writes OUTDIR/NAME.json; then all records that stand
 in OUTDIR are drawn as OUTDIR/all.html and all.txt, a plot of each scene as SCENE.svg. Where one fails, the others go on.
-Where one of --spp, --replicates and --reference-spp is not given, each renderer takes what is good for it (see LADDERS): all
-in all an hour or so, where references are kept. They are in DIR/references. --threads and --size are handed on as they are.
-With --keep, what OUTDIR has already is not measured again, so that a run goes on where it was stopped.
+Where one of --spp, --replicates and --reference-spp is not given, each renderer takes what is good for it (see LADDERS): which
+is meant to take an hour or so in all, where references are kept. They are in DIR/references. --threads and --size are handed on as they are.
+With --keep, renderers whose record OUTDIR has already are not measured again, so that a run goes on with the one at which it
+was stopped: records bear their name once they are whole (till then NAME.json.part).
 
 Peers that need another Python than this one: --python cycles=PROGRAM, as often as needed.
 """
@@ -94,7 +95,8 @@ def main():
             path = os.path.join(a.json, f"{record}.json")
             if a.keep and os.path.exists(path):
                 continue
-            out = ["--json", path, *ladder(peer, rest)]
+            part = f"{path}.part"
+            out = ["--json", part, *ladder(peer, rest)]
             if peer == "skylit":
                 files = [os.path.join(a.dir, f"{name}.toml") for name in names or all_scenes(a.dir)]
                 kept = ["--references", os.path.join(a.dir, "references")]
@@ -103,7 +105,9 @@ def main():
                 python = pythons.get(peer, sys.executable)
                 words = [python, os.path.join(HOME, script[0]), a.dir, *names, *out, *script[1:], *rest]
             print(f"{record}:", file=sys.stderr)
-            if subprocess.run(words, stdout=subprocess.DEVNULL).returncode != 0:
+            if subprocess.run(words, stdout=subprocess.DEVNULL).returncode == 0 and os.path.exists(part):
+                os.replace(part, path)
+            else:
                 failed.append(record)
     draw(a)
     if failed:

@@ -69,8 +69,8 @@ struct SamplingArgs {
     /// everywhere [default: integrate]
     #[arg(long, value_name = "integrate|sample")]
     sky_pixels: Option<SkyPixels>,
-    /// Samples of pixels that outlines run through, at most, for each of another's (1: as many) [default: 4, or 1
-    /// where paths go on or there are several lights]
+    /// Samples of pixels that outlines run through, at most, for each of another's (1: as many) [default: 4
+    /// where a surface point's samples of light are shared out among them, else 1: on paths, under several lights]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_OUTLINES)))]
     outlines: Option<u32>,
     /// Which pixels the samples go to: those that need them, for what --spp samples of each would cost, as far as their need

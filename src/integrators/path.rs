@@ -196,8 +196,8 @@ impl Integrator for PathTracer {
         true
     }
 
-    /// Where samples of light are shared out among more camera rays. Measured: a path, or one sample of each, times four on outlines
-    /// takes 4 to 11 % more time to the same error than none more.
+    /// Where samples of light are shared out among more camera rays. Where there is one of each, or a path, four times as many
+    /// on outlines take 4 to 11 % more time to the same error (benches/README.md).
     fn gains_by_outlines(&self, scene: &Scene) -> bool {
         let (lights, ends) = (&scene.lights, self.max_depth == 1);
         let splits = self.light_sampling && lights.list.len() == 1 && lights.guided().is_some();

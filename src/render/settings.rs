@@ -11,7 +11,8 @@ use crate::sampling::filter::PixelFilter;
 use crate::scene::desc::SceneDesc;
 use std::time::Duration;
 
-/// What [`RenderSettings::outlines`] is where the integrator gains by it: more would gain little, as the error of an edge falls as the power 1.5 of samples.
+/// What [`RenderSettings::outlines`] is where the integrator gains by it: more would gain little, as the error of an edge falls
+/// as the power 1.5 of samples.
 pub const OUTLINES: u32 = 4;
 /// Most of that.
 pub const MOST_OUTLINES: u32 = 64;
