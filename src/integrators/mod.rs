@@ -70,6 +70,8 @@ pub struct CameraBatch {
     /// How many samples these pixels take for each of another, if more than one: what takes several samples of a light for
     /// each camera ray takes as many fewer.
     pub times: u32,
+    /// One of the pixels, which all lie in one block of [`strategy::BLOCK_SIDE`], counted from where the render's pixels begin.
+    pub pixel: [u32; 2],
 }
 
 /// Identities as a structure of arrays, all of one length.
@@ -138,10 +140,10 @@ impl PathResults {
 }
 
 /// What is spent on a sample beside its rays, in rays of a shadow's cost.
-const SAMPLE_COST: f64 = 2.0;
+const SAMPLE_COST: f64 = 4.0;
 /// The same of a coherent camera ray, a scattered ray with the surface that it may meet, and a shadow ray with its light
 /// sample.
-const RAY_COSTS: [f64; 3] = [0.5, 1.6, 1.6];
+const RAY_COSTS: [f64; 3] = [0.5, 4.0, 1.6];
 /// What a sample that meets no surface costs in all, in the same.
 pub const BARE_COST: f64 = 0.2;
 
