@@ -2,7 +2,7 @@
 
 use super::path::{PathScratch, PathState};
 use super::pending::{ShadowRays, add_arriving};
-use super::strategy::LocalStrategies;
+use super::strategy::Strategies;
 use super::{PathIds, PathResults, Workspace};
 use crate::base::light::{GuidedLight, PathEnd, Receiver};
 use crate::base::ray::{Coherence, RayBatch};
@@ -28,7 +28,7 @@ pub(super) struct Block<'a> {
     pub each_light: bool,
     /// The light at infinity that takes surfaces into account.
     pub guided: Option<(u32, &'a dyn GuidedLight)>,
-    pub strategies: LocalStrategies<'a>,
+    pub strategies: &'a Strategies,
     /// Whether surfaces may take several samples of the only light.
     pub splits: bool,
     /// Of how many of these they take one; at least 1. See [`super::CameraBatch::times`].

@@ -29,6 +29,7 @@ use crate::base::registry::Row;
 use crate::base::vertex::Vertex;
 use crate::color::Rgb;
 use crate::sampler::{Dim, PixelSampler, Sampler, Slot};
+use crate::sampling::filter::PixelFilter;
 use crate::scene::Scene;
 use std::sync::Arc;
 
@@ -70,8 +71,6 @@ pub struct CameraBatch {
     /// How many samples these pixels take for each of another, if more than one: what takes several samples of a light for
     /// each camera ray takes as many fewer.
     pub times: u32,
-    /// One of the pixels, which all lie in one block of [`strategy::BLOCK_SIDE`], counted from where the render's pixels begin.
-    pub pixel: [u32; 2],
 }
 
 /// Identities as a structure of arrays, all of one length.
@@ -139,7 +138,8 @@ impl PathResults {
     }
 }
 
-/// What is spent on a sample beside its rays, in rays of a shadow's cost.
+/// What a camera ray's surface point takes beside the rays that leave it, in units of some 48 ns of a thread on the machine of
+/// benches/README.md. These costs fit even renders of four scenes with several strategies.
 const SAMPLE_COST: f64 = 4.0;
 /// The same of a coherent camera ray, a scattered ray with the surface that it may meet, and a shadow ray with its light
 /// sample.
@@ -222,6 +222,8 @@ pub struct PilotPlan<'a> {
     pub seed: u64,
     /// Kind of its points.
     pub kind: Sampler,
+    /// Its pixel filter.
+    pub filter: PixelFilter,
     /// Pixels that take more samples than others.
     pub is_outline: &'a (dyn Fn(u32, u32) -> bool + Sync),
     /// How many for each of another's.

@@ -83,7 +83,7 @@ pub(super) const STRATEGY: ParamSpec = ParamSpec {
     default: Some("auto"),
     doc: "how a sky that is sampled by products is found: by light samples, scattered rays or both, so many of \
           each at the first surface where the sky is the only light (both: where paths end there); auto tries them out \
-          for each material, by-block for what each shows in each block of pixels",
+          for each material",
 };
 
 /// Most lights that are sampled each: a shadow ray for every one of them waits at every surface.
@@ -104,17 +104,8 @@ pub struct PathTracer {
     pub mis: bool,
     /// How light at infinity is found.
     pub strategies: Strategies,
-    /// How [`Integrator::specialise`] may change `strategies`, if it may.
-    pub auto_strategy: Option<Auto>,
-}
-
-/// For what strategies are tried out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Auto {
-    /// Each material.
-    ByMaterial,
-    /// Each material, and what it shows in each block of pixels.
-    ByBlock,
+    /// Whether [`Integrator::specialise`] may change `strategies`.
+    pub auto_strategy: bool,
 }
 
 impl Default for PathTracer {
@@ -127,7 +118,7 @@ impl Default for PathTracer {
             each_light: false,
             mis: true,
             strategies: Strategies::default(),
-            auto_strategy: Some(Auto::ByMaterial),
+            auto_strategy: true,
         }
     }
 }
@@ -212,8 +203,7 @@ impl Integrator for PathTracer {
     fn gains_by_outlines(&self, scene: &Scene) -> bool {
         let (lights, ends) = (&scene.lights, self.max_depth == 1);
         let splits = self.light_sampling && lights.list.len() == 1 && lights.guided().is_some();
-        splits
-            && if self.auto_strategy.is_some() { ends } else { self.strategies.usual().takes_several(ends) }
+        splits && if self.auto_strategy { ends } else { self.strategies.usual().takes_several(ends) }
     }
 
     fn specialise(&self, scene: &Scene, plan: &PilotPlan) -> Option<Specialised> {
@@ -221,28 +211,22 @@ impl Integrator for PathTracer {
     }
 }
 
-/// One for all surfaces, or what is to be tried out.
-pub(super) fn strategy_param(p: &Params) -> Result<(Strategies, Option<Auto>)> {
-    let name = p.text_or("strategy", "auto")?;
-    let auto = match (Strategy::find(name), name) {
-        (Some(_), _) => None,
-        (None, "by-block") => Some(Auto::ByBlock),
-        (None, _) => Some(Auto::ByMaterial),
-    };
-    Ok((Strategies::uniform(Strategy::find(name).unwrap_or_default()), auto))
+/// None where it is to be tried out.
+pub(super) fn strategy_param(p: &Params) -> Result<Option<Strategy>> {
+    Ok(Strategy::find(p.text_or("strategy", "auto")?))
 }
 
 impl PathTracer {
     fn from_params(p: &Params) -> Result<Self> {
-        let (strategies, auto_strategy) = strategy_param(p)?;
+        let strategy = strategy_param(p)?;
         Ok(PathTracer {
             max_depth: p.number_or("max_depth", 6.0)? as u32,
             roulette_depth: p.number_or("roulette_depth", 4.0)? as u32,
             light_sampling: p.bool_or("light_sampling", true)?,
             each_light: p.bool_or("each_light", false)?,
             mis: p.bool_or("mis", true)?,
-            strategies,
-            auto_strategy,
+            strategies: Strategies::uniform(strategy.unwrap_or_default()),
+            auto_strategy: strategy.is_none(),
         })
     }
 
@@ -258,7 +242,7 @@ impl PathTracer {
             samples_lights,
             each_light: self.each_light && lights.list.len() <= MOST_EACH,
             guided,
-            strategies: self.strategies.around(batch.pixel),
+            strategies: &self.strategies,
             times: batch.times.max(1),
             splits: depth == 1 && lights.list.len() == 1,
             ends: depth == self.max_depth,

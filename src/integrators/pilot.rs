@@ -1,38 +1,40 @@
-//! Which strategy suits which material, and where, tried out before a render.
+//! Which strategy suits which material, tried out before a render.
 //!
 //! Pixels of a coarse lattice are rendered with each strategy, by the integrator itself and with points of the kind that the
 //! render will use; their spread is the variance that the render would have, visibility and all. Rays are counted, not timed,
 //! so that the choice is a function of scene and seed. A material's strategy is the one that takes the least time to the same
-//! error; in a block of pixels where another takes less, as in corners that little light finds, it is that one. Materials
-//! that few of the pixels show keep to what is good in most scenes: light samples alone where paths end at the first surface
-//! and that is known to scatter evenly, else scattered rays as well.
+//! error. Materials that few of the pixels show keep to what is good in most scenes: light samples alone where paths end at
+//! the first surface and that is known to scatter evenly, else scattered rays as well.
+//!
+//! Tried: a strategy for each block of pixels (3ec7b42, `strategy=by-block`). Where samples go by need it is worth a few
+//! percent on two scenes of nine, and less than nothing on another (benches/README.md).
 
 mod judge;
 mod scout;
 mod trial;
 
-use super::path::{Auto, PathTracer};
-use super::strategy::{BLOCK_SIDE, Strategies, Strategy};
+use super::path::PathTracer;
+use super::strategy::{Strategies, Strategy};
 use super::{PilotPlan, RayCounts, Specialised};
 use crate::scene::Scene;
-use judge::{Bare, Choice, Judge};
+use judge::{Bare, best};
 use scout::{Class, Seen};
 use std::sync::Arc;
 use trial::{SAMPLES, Tracing};
 
 /// Strategies that are tried, at most, or nearly so.
 const CANDIDATES: usize = 4;
-/// Fewer pixels of a material say nothing.
-const LEAST: usize = 24;
+/// Most pixels of a material that are tried.
+const MOST: usize = 192;
+/// Fewer say nothing.
+const LEAST: usize = 12;
 /// Pixels, over all materials, that a render must afford to try out for trials to be worth their tables of the sky, of
 /// hundreds of directions and for each strategy others: under a tame light, where there is most to be gained, and others.
-const WORTHWHILE: [usize; 2] = [192, 768];
+const WORTHWHILE: [usize; 2] = [96, 1536];
 /// Most part of a render's samples that is spent on trying.
 const SHARE: f64 = 0.02;
-/// Fewest pixels, across and down, for each of those that are looked at: by then a block is known.
-const STEP: u32 = 4;
-/// Most strategies that are kept, of all blocks and materials; beyond, there is one for each material.
-const MOST_KEPT: usize = 1 << 20;
+/// Most camera rays that look for materials.
+const SCOUTS: usize = 8192;
 
 /// Most contrast of a light that scattered rays, or light samples that know little of narrow lobes, are trusted with.
 /// A pilot of thousands of samples overlooks what is met by one in some hundreds at most; at this contrast that is worth
@@ -45,8 +47,6 @@ struct Choices {
     /// whose surface point costs as much as two of them, where the integrator takes more than one.
     even: Strategy,
     others: Strategy,
-    /// Whether surface points may take several light samples.
-    splits: bool,
     /// Whether the light is trusted, see [`TAME`].
     is_tame: bool,
 }
@@ -62,7 +62,6 @@ impl Choices {
                 (false, _) => Strategy::Both(1),
             },
             others: Strategy::Both(if splits && ends { 4 } else { 1 }),
-            splits,
             is_tame: contrast <= TAME,
         }
     }
@@ -72,15 +71,16 @@ impl Choices {
     }
 
     /// What is tried for a material, the most likely first. Scattered rays alone miss what is small and bright. So do light
-    /// samples on narrow lobes: tables know their widths and middles, not their shapes.
+    /// samples on narrow lobes: tables know their widths and middles, not their shapes. (Several light samples for the first
+    /// surface of a path were never the best for all that a material shows.)
     fn candidates(&self, is_even: bool) -> Vec<Strategy> {
         let usual = self.usual(is_even);
         let mut all = vec![usual];
-        match usual {
-            Strategy::Light(8) => all.extend([Strategy::Light(2), Strategy::Light(1)]),
-            Strategy::Both(1) if is_even && self.splits => all.push(Strategy::Light(8)),
-            Strategy::Both(1) => {}
-            _ => all.push(Strategy::Both(1)),
+        if usual == Strategy::Light(8) {
+            all.push(Strategy::Light(2));
+        }
+        if usual != Strategy::Both(1) {
+            all.push(Strategy::Both(1));
         }
         if self.is_tame {
             all.push(Strategy::Bsdf);
@@ -96,7 +96,9 @@ impl Choices {
 
 /// See the module.
 pub(super) fn choose(tracer: &PathTracer, scene: &Scene, plan: &PilotPlan) -> Option<Specialised> {
-    let auto = tracer.auto_strategy.filter(|_| tracer.light_sampling && tracer.mis)?;
+    if !(tracer.auto_strategy && tracer.light_sampling && tracer.mis) {
+        return None;
+    }
     let choices = Choices::new(tracer, scene, scene.lights.guided()?.1.contrast());
     let mut seen = Seen::new(scene);
     let mut rays = RayCounts::default();
@@ -104,53 +106,56 @@ pub(super) fn choose(tracer: &PathTracer, scene: &Scene, plan: &PilotPlan) -> Op
     let affordable = (samples / (SAMPLES as usize * CANDIDATES) as f64) as usize;
     let tries = affordable >= WORTHWHILE[usize::from(!choices.is_tame)] && choices.are_several();
     if affordable >= LEAST {
-        rays.camera += seen.scout(scene, plan, samples as usize);
+        rays.camera += seen.scout(scene, plan, (samples as usize).min(SCOUTS));
     }
-    for class in &mut seen.classes {
-        class.candidates = choices.candidates(class.is_even);
-        class.candidates.truncate(if tries && class.pixels >= LEAST { usize::MAX } else { 1 });
-    }
-    let usual: Vec<Strategy> = seen.classes.iter().map(Class::usual).collect();
-    let decided = tries.then(|| {
-        let every = seen.thin_out(affordable);
-        let tracing = Tracing { tracer, scene, plan, classes: &seen.of, usual: &usual };
-        let cells = tracing.cells(&seen);
-        let bare = if plan.by_need { Bare::default() } else { Bare::of(&tracing, &seen, affordable / 4) };
-        cells.iter().flat_map(|c| &c.trials).for_each(|t| rays.add(&t.rays));
+    let mut strategies: Vec<Strategy> = seen.classes.iter().map(|c| choices.usual(c.is_even)).collect();
+    if tries {
+        let tracing = Tracing { tracer, scene, plan, classes: &seen.of, usual: &strategies };
+        let bare =
+            if plan.by_need { Bare::default() } else { Bare::of(&tracing, &seen, affordable.min(MOST)) };
         rays.add(&bare.rays);
-        Judge { classes: &seen.classes, bare, every: every as f64, by_need: plan.by_need }
-            .decide(cells, auto == Auto::ByBlock)
-    });
-    let choice = decided.unwrap_or_else(|| Choice { usual, elsewhere: Vec::new() });
-    let kept = plan.pixels.tiles(BLOCK_SIDE).count().saturating_mul(seen.classes.len());
-    let strategies = if choice.elsewhere.is_empty() || kept > MOST_KEPT {
-        Strategies::by_class(seen.of.clone(), &choice.usual)
-    } else {
-        let rows = choice.rows(kept / seen.classes.len());
-        Strategies::by_block(seen.of.clone(), plan.pixels, &rows, seen.classes.len())
-    };
-    let decided = describe(&seen, &choice);
-    let integrator = Arc::new(PathTracer { strategies, auto_strategy: None, ..tracer.clone() });
+        let most = (affordable / seen.classes.len().max(1)).min(MOST);
+        let of_class = |(number, class): (usize, &Class)| {
+            let candidates = choices.candidates(class.is_even);
+            let pixels = thinned(&class.pixels, most);
+            if !class.scatters() || pixels.len() < LEAST || candidates.len() < 2 {
+                return candidates[0];
+            }
+            let run = |s: &Strategy| tracing.of_class(number, *s, &pixels);
+            let trials: Vec<_> = candidates.iter().map(run).collect();
+            trials.iter().for_each(|t| rays.add(&t.rays));
+            candidates[best(&trials, class.pixels.len() as f64, &bare)]
+        };
+        strategies = seen.classes.iter().enumerate().map(of_class).collect();
+    }
+    let decided = describe(scene, &seen, &strategies);
+    let strategies = Strategies::by_class(&seen.of, &strategies);
+    let integrator = Arc::new(PathTracer { strategies, auto_strategy: false, ..tracer.clone() });
     Some(Specialised { integrator, decided, rays })
 }
 
-/// "light-8 for 3 materials, both for 1; by light-2, bsdf in 30 of 240 parts of blocks".
-fn describe(seen: &Seen, choice: &Choice) -> String {
+/// About `most` of them, evenly.
+fn thinned(pixels: &[[u32; 2]], most: usize) -> Vec<[u32; 2]> {
+    let n = pixels.len();
+    if n > most { (0..most).map(|i| pixels[i * n / most]).collect() } else { pixels.to_vec() }
+}
+
+/// "light for 3 materials (clay...), both for 1 material".
+fn describe(scene: &Scene, seen: &Seen, strategies: &[Strategy]) -> String {
     let mut parts = Vec::new();
     for (name, strategy) in Strategy::NAMES {
-        let wanted = |class: &Class, of: &Strategy| *of == strategy && class.scatters();
-        let n = seen.classes.iter().zip(&choice.usual).filter(|(class, of)| wanted(class, of)).count();
-        if n > 0 {
-            parts.push(format!("{name} for {n} material{}", if n == 1 { "" } else { "s" }));
+        let wanted = |class: usize| strategies[class] == strategy && seen.classes[class].scatters();
+        let n = (0..strategies.len()).filter(|class| wanted(*class)).count();
+        if n == 0 {
+            continue;
         }
+        let first = (0..).zip(&scene.objects).find(|(o, _)| seen.of.of(*o, 0).is_some_and(wanted));
+        let example = first.map_or(String::new(), |(_, object)| format!(" ({}...)", object.name));
+        let s = if n == 1 { "" } else { "s" };
+        parts.push(format!("{name} for {n} material{s}{}", if n > 1 { example } else { String::new() }));
     }
-    let mut text = format!("sky found by {}", parts.join(", "));
-    if !choice.elsewhere.is_empty() {
-        let is_there = |wanted: &Strategy| choice.elsewhere.iter().any(|(_, strategy)| strategy == wanted);
-        let names = Strategy::NAMES.iter().filter(|(_, strategy)| is_there(strategy));
-        let names = names.map(|n| n.0).collect::<Vec<_>>().join(", ");
-        text +=
-            &format!("; by {names} in {} of {} parts of blocks", choice.elsewhere.len(), seen.cells.len());
-    }
-    text
+    format!("sky found by {}", parts.join(", "))
 }
+
+#[cfg(test)]
+mod tests;

@@ -3,20 +3,17 @@
 use super::backdrop::Backdrop;
 use super::coverage::Coverage;
 use super::dealing::{Counts, Kind, Note, Spent};
-use super::film::{FilmTile, REPLICATES, TILE_SIDE};
+use super::film::{FilmTile, REPLICATES};
 use super::layers::Layers;
 use super::outlines::Outlines;
 use super::settings::RenderSettings;
 use crate::base::camera::FilmSamples;
 use crate::base::pixel_rect::PixelRect;
-use crate::integrators::strategy::BLOCK_SIDE;
 use crate::integrators::{CameraBatch, Integrator, PathId, PathIds, PathResults, Workspace};
 use crate::math::simd;
 use crate::sampler::{Dim, PointSet, points_2d, ray_key};
 use crate::scene::Scene;
 use std::ops::Range;
-
-const _: () = assert!(BLOCK_SIDE.is_multiple_of(TILE_SIDE), "tiles lie in one block each");
 
 /// Rays that are traced together. Large enough that the kernel's batches and the loops over columns run long,
 /// small enough that a block's state stays in the second-level cache (about 100 bytes a ray).
@@ -181,7 +178,6 @@ impl Worker {
         self.batch.spread = job.scene.camera.pixel_spread();
         self.batch.want_first = !job.settings.aovs.is_empty();
         self.batch.times = 1;
-        self.batch.pixel = [rect.x0, rect.y0];
         self.notes.clear();
         self.notes.resize(if job.notes { rect.area() } else { 0 }, Note::default());
         let free = |x, y| job.coverage.is_some_and(|c| !c.is_covered(x, y));

@@ -181,6 +181,7 @@ impl Renderer {
             spp: s.spp,
             seed: s.seed,
             kind: s.sampler,
+            filter: s.filter,
             is_outline: &is_outline,
             outline_times: outlines.as_ref().map_or(1, Outlines::times),
             by_need: s.deals(),

@@ -5,10 +5,9 @@ use crate::base::hit::HitBatch;
 use crate::base::material::{Material, Prepared};
 use crate::base::ray::{Coherence, RayBatch};
 use crate::integrators::PilotPlan;
-use crate::integrators::pilot::STEP;
-use crate::integrators::strategy::{Classes, Strategy, block_of};
+use crate::integrators::strategy::Classes;
 use crate::scene::Scene;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::HashMap;
 use std::sync::Arc;
 
 /// A kind of surface: those that share a material.
@@ -16,10 +15,8 @@ pub(super) struct Class<'a> {
     material: &'a Arc<dyn Material>,
     /// Whether it was seen, and scattered evenly wherever that was.
     pub is_even: bool,
-    /// How many pixels show it.
-    pub pixels: usize,
-    /// Strategies that it may have, the usual first.
-    pub candidates: Vec<Strategy>,
+    /// Where it was seen first by a camera ray.
+    pub pixels: Vec<[u32; 2]>,
 }
 
 impl Class<'_> {
@@ -27,20 +24,13 @@ impl Class<'_> {
     pub fn scatters(&self) -> bool {
         !self.material.is_delta() && !self.material.is_black()
     }
-
-    /// What it has without trial.
-    pub fn usual(&self) -> Strategy {
-        self.candidates.first().copied().unwrap_or_default()
-    }
 }
 
 /// What the pixels of a lattice show.
 pub(super) struct Seen<'a> {
     pub classes: Vec<Class<'a>>,
     /// The classes of all objects and slots.
-    pub of: Arc<Classes>,
-    /// Pixels by block and class.
-    pub cells: BTreeMap<(usize, usize), Vec<[u32; 2]>>,
+    pub of: Classes,
     /// Pixels in whose middle there is no surface.
     pub bare: Vec<[u32; 2]>,
     /// Pixels that outlines run through.
@@ -55,20 +45,19 @@ impl<'a> Seen<'a> {
         let of = Classes::by_object(scene.objects.iter().map(|object| {
             let slots = object.materials.iter().map(|material| {
                 *by_address.entry(Arc::as_ptr(material).cast::<()>()).or_insert_with(|| {
-                    classes.push(Class { material, is_even: false, pixels: 0, candidates: Vec::new() });
+                    classes.push(Class { material, is_even: false, pixels: Vec::new() });
                     classes.len() as u32 - 1
                 })
             });
             slots.collect()
         }));
-        let (bare, outlined) = (Vec::new(), Vec::new());
-        Seen { classes, of: Arc::new(of), cells: BTreeMap::new(), bare, outlined }
+        Seen { classes, of, bare: Vec::new(), outlined: Vec::new() }
     }
 
     /// Looks through the middles of `most` pixels or fewer; returns the rays that took.
     pub fn scout(&mut self, scene: &Scene, plan: &PilotPlan, most: usize) -> u64 {
         let rect = plan.pixels;
-        let step = ((rect.area() as f64 / most.max(1) as f64).sqrt().ceil() as u32).max(STEP);
+        let step = ((rect.area() as f64 / most.max(1) as f64).sqrt().ceil() as u32).max(1);
         let lattice = |from: u32, to: u32| (from + step / 2..to).step_by(step as usize);
         let pixels = lattice(rect.y0, rect.y1).flat_map(|y| lattice(rect.x0, rect.x1).map(move |x| [x, y]));
         let (outlined, pixels): (Vec<[u32; 2]>, Vec<[u32; 2]>) =
@@ -88,33 +77,15 @@ impl<'a> Seen<'a> {
                 continue;
             };
             let v = scene.vertex(&rays.get(i), hit, 0.0);
-            let number = self.of.of(v.object, v.slot);
+            let Some(number) = self.of.of(v.object, v.slot) else { continue };
             let class = &mut self.classes[number];
             let mut prepared = Prepared::default();
             class.material.prepare(&v, &mut prepared);
             let is_even = class.material.transmission().is_none()
                 && class.material.scattering(&prepared).is_some_and(|s| s.facets == 0.0);
-            class.is_even = is_even && (class.is_even || class.pixels == 0);
-            class.pixels += 1;
-            if class.scatters() {
-                self.cells.entry((block_of(&rect, *pixel), number)).or_default().push(*pixel);
-            }
+            class.is_even = is_even && (class.is_even || class.pixels.is_empty());
+            class.pixels.push(*pixel);
         }
         pixels.len() as u64
-    }
-
-    /// Keeps one in so many of the pixels of cells, so that there are about `most` of them; returns the number.
-    pub fn thin_out(&mut self, most: usize) -> usize {
-        let all: usize = self.cells.values().map(Vec::len).sum();
-        let every = all.div_ceil(most.max(1)).max(1);
-        let mut number = 0;
-        for pixels in self.cells.values_mut() {
-            pixels.retain(|_| {
-                number += 1;
-                number % every == 0
-            });
-        }
-        self.cells.retain(|_, pixels| !pixels.is_empty());
-        every
     }
 }

@@ -264,7 +264,7 @@ impl Plan {
 }
 
 /// Samples of a render that may take long: just enough for a pilot to try out materials.
-const LONG: u32 = 4288;
+const LONG: u32 = 17152;
 
 /// Something that is to change no mean.
 pub struct Technique {
