@@ -23,6 +23,7 @@ use skylit::base::ray::Coherence;
 use skylit::base::registry::{Node, build};
 use skylit::formats;
 use skylit::integrators::{self, Integrator};
+use skylit::render::dealing::Dealing;
 use skylit::render::settings::RenderSettings;
 use skylit::render::{Renderer, Silent};
 use skylit::scene::Scene;
@@ -93,7 +94,7 @@ fn main() {
                 crop,
                 spp: o.spp,
                 threads: o.threads,
-                by_need: false,
+                dealing: Dealing::Even,
                 ..RenderSettings::new(size)
             };
             let t = band(&mut scene, &integrator, settings, &recorder, &tape, &bare, &pool);

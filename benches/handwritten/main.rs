@@ -25,6 +25,7 @@ use skylit::base::intersectable::KernelOptions;
 use skylit::base::registry::build;
 use skylit::formats;
 use skylit::integrators::{self, Integrator};
+use skylit::render::dealing::Dealing;
 use skylit::render::settings::RenderSettings;
 use skylit::render::{Rendered, Renderer, Silent};
 use skylit::scene::Scene;
@@ -86,7 +87,7 @@ impl Sides {
         settings.threads = o.threads;
         settings.spp = o.spp.unwrap_or(settings.spp);
         // Samples for samples: the other side knows of no pixels that take more of them.
-        (settings.outlines, settings.by_need) = (Some(1), false);
+        (settings.outlines, settings.dealing) = (Some(1), Dealing::Even);
         assert!(settings.spp > 1 && settings.spp as usize <= CALL, "from 2 to {CALL} samples a pixel");
         let node = desc.render.integrator.clone().expect("the scene names its integrator");
         let integrator = build("integrator", integrators::REGISTRY, &node).expect("the integrator is there");

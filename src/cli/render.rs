@@ -14,6 +14,7 @@ use crate::formats::native::MAX_SIDE;
 use crate::image::write::{check_file, write_file};
 use crate::integrators::Integrator;
 use crate::render::Renderer;
+use crate::render::dealing::Dealing;
 use crate::render::settings::{MOST_OUTLINES, RenderSettings, crop_window};
 use crate::sampler::Sampler;
 use crate::sampling::filter::PixelFilter;
@@ -119,13 +120,6 @@ impl From<ModeArg> for KernelMode {
 enum SkyPixels {
     Integrate,
     Sample,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Dealing {
-    ByNeed,
-    ByGuess,
-    Even,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -236,8 +230,7 @@ impl SamplingArgs {
             filter: plan.filter.unwrap_or(usual.filter),
             skip_background: self.sky_pixels != Some(SkyPixels::Sample),
             outlines: self.outlines,
-            by_need: self.dealing != Some(Dealing::Even),
-            doubts: self.dealing != Some(Dealing::ByGuess),
+            dealing: self.dealing.unwrap_or_default(),
             threads,
             moments: plan.output.moments,
             aovs: plan.output.aovs.clone(),

@@ -5,6 +5,7 @@ use super::rounds::Rounds;
 use crate::error::{Error, Result};
 use crate::integrators::{Avoided, RayCounts};
 use crate::memory::{self, in_words};
+use crate::render::dealing::Dealing;
 use crate::render::settings::RenderSettings;
 use crate::render::{OutlineStats, RenderStats, Rendered};
 use crate::scene::{BuildReport, Scene};
@@ -160,11 +161,7 @@ impl Record {
             spp: if settings.deals() { settings.spp } else { stats.spp },
             seed: settings.seed,
             sampler: settings.points().kind().name(),
-            dealing: match (settings.deals(), settings.doubts) {
-                (true, true) => "by-need",
-                (true, false) => "by-guess",
-                (false, _) => "even",
-            },
+            dealing: if settings.deals() { settings.dealing } else { Dealing::Even }.name(),
             filter: settings.filter.name(),
             scene: Contents::new(&scene.report, scene.lights.list.len()),
             seconds: Seconds {

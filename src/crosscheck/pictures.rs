@@ -2,6 +2,7 @@
 
 use super::Plan;
 use crate::error::Result;
+use crate::render::dealing::Dealing;
 use crate::render::film::Film;
 use crate::render::{Progress, Renderer};
 use crate::scene::Scene;
@@ -76,7 +77,7 @@ pub(super) fn render(scene: &Scene, plan: &Plan, progress: &dyn Progress) -> Res
     settings.time = None;
     // Every sample has the rays that were compared, by the integrator as it is.
     (settings.skip_background, settings.pilot, settings.outlines) = (false, false, Some(1));
-    settings.by_need = false;
+    settings.dealing = Dealing::Even;
     let renderer = Renderer { integrator: Arc::clone(&plan.integrator), settings };
     Ok(renderer.render(scene, &Onward(progress))?.film)
 }

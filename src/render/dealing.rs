@@ -21,9 +21,43 @@ pub use note::{Kind, Note};
 use super::outlines::Outlines;
 use super::settings::RenderSettings;
 use crate::base::pixel_rect::PixelRect;
+use crate::error::{Error, Result, unknown_name};
 use crate::integrators::{BARE_COST, RayCounts};
 use dealer::{Dealer, Floor, Guess};
 use rayon::prelude::*;
+use std::str::FromStr;
+
+/// How a fixed number of samples is dealt to the pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Dealing {
+    /// As many to each.
+    Even,
+    /// By what pixels need, believed as far as it was foretold for others, down to not at all.
+    #[default]
+    ByNeed,
+    /// By what they seem to need, as if that were certain.
+    ByGuess,
+}
+
+impl Dealing {
+    /// All of them with their names.
+    pub const NAMES: [(&'static str, Dealing); 3] =
+        [("by-need", Dealing::ByNeed), ("by-guess", Dealing::ByGuess), ("even", Dealing::Even)];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        Self::NAMES.iter().find(|n| n.1 == self).map_or("", |n| n.0)
+    }
+}
+
+impl FromStr for Dealing {
+    type Err = Error;
+
+    fn from_str(s: &str) -> Result<Self> {
+        let found = Self::NAMES.iter().find(|n| n.0 == s).map(|n| n.1);
+        found.ok_or_else(|| Error::Usage(unknown_name("dealing", s, Self::NAMES.iter().map(|n| n.0))))
+    }
+}
 
 /// Samples a pixel below which all get the same: half of fewer have no spread.
 pub const LEAST_SPP: u32 = 4;
@@ -153,7 +187,10 @@ impl Notes {
             (0..self.list.len()).into_par_iter().with_min_len(1 << 12).map(guess).collect();
         let plan = |wanted: usize| {
             let rows = self.rect.pixels().zip(&guesses);
-            let trust = if settings.doubts { self.trust(1 - wanted, costs, &dealer) } else { 1.0 };
+            let trust = match settings.dealing {
+                Dealing::ByGuess => 1.0,
+                Dealing::ByNeed | Dealing::Even => self.trust(1 - wanted, costs, &dealer),
+            };
             dealer.plan(rows.filter(|((x, y), _)| colour(*x, *y) == wanted).map(|(_, g)| g), trust)
         };
         let (white, black) = rayon::join(|| plan(0), || plan(1));

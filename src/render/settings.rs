@@ -4,7 +4,7 @@ use crate::base::pixel_rect::PixelRect;
 use crate::error::{Error, Result};
 use crate::render::adaptive::Target;
 use crate::render::aov::AovRow;
-use crate::render::dealing::LEAST_SPP;
+use crate::render::dealing::{Dealing, LEAST_SPP};
 use crate::render::film::REPLICATES;
 use crate::sampler::{PointSet, Sampler};
 use crate::sampling::filter::PixelFilter;
@@ -45,12 +45,9 @@ pub struct RenderSettings {
     /// How many samples, at most, pixels that outlines run through take for each of another; 1 if no more; None for what is
     /// best with the integrator. See [`super::outlines`].
     pub outlines: Option<u32>,
-    /// Whether pixels get samples by what they need, for the same cost in all, or all as many; see [`super::dealing`]. Takes
+    /// Which pixels get how many samples, for the same cost in all. Other than even takes
     /// [`super::dealing::LEAST_SPP`] samples, and does not go with `moments`, `target` or `time`, which deal by rounds.
-    pub by_need: bool,
-    /// Whether what pixels need is believed only as far as it was foretold for others, down to not at all; see
-    /// [`super::dealing`].
-    pub doubts: bool,
+    pub dealing: Dealing,
     /// Whether the film shall know how large its error is: each pixel's samples are then two independent randomisations,
     /// which are less even together than one. Targets and time limits ask for that by themselves.
     pub moments: bool,
@@ -94,8 +91,7 @@ impl RenderSettings {
             filter: PixelFilter::default(),
             skip_background: true,
             outlines: None,
-            by_need: true,
-            doubts: true,
+            dealing: Dealing::default(),
             moments: false,
             pilot: true,
             threads: std::thread::available_parallelism().map_or(1, |n| n.get()),
@@ -139,9 +135,9 @@ impl RenderSettings {
         self.sampler.points(seed, (!decides).then_some(count))
     }
 
-    /// Whether samples are dealt by need.
+    /// Whether samples are dealt by what pixels show.
     pub fn deals(&self) -> bool {
-        self.by_need && self.spp >= LEAST_SPP && !self.moments && !self.has_rounds()
+        self.dealing != Dealing::Even && self.spp >= LEAST_SPP && !self.moments && !self.has_rounds()
     }
 
     /// Whether what was sampled decides how many samples pixels get.

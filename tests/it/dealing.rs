@@ -2,6 +2,7 @@
 
 use crate::common::{integrator, scene};
 use skylit::integrators::Integrator;
+use skylit::render::dealing::Dealing;
 use skylit::render::settings::RenderSettings;
 use skylit::render::{Rendered, Renderer, Silent};
 use skylit::scene::Scene;
@@ -68,18 +69,18 @@ fn relative(picture: &[f64], truth: &[f64]) -> f64 {
 fn the_same_rays_leave_less_error() {
     let bench = Bench::new();
     let truth = luminances(&bench.render(|s| {
-        (s.spp, s.by_need, s.seed) = (1024, false, 1 << 40);
+        (s.spp, s.dealing, s.seed) = (1024, Dealing::Even, 1 << 40);
     }));
-    let mean = |by_need: bool| {
+    let mean = |dealing: Dealing| {
         let (mut error, mut rays) = (0.0, 0.0);
         for seed in 0..8 {
-            let r = bench.render(|s| (s.by_need, s.seed) = (by_need, seed));
+            let r = bench.render(|s| (s.dealing, s.seed) = (dealing, seed));
             error += relative(&luminances(&r), &truth) / 8.0;
             rays += (r.stats.rays.shadow + r.stats.rays.scattered) as f64 / 8.0;
         }
         (error, rays)
     };
-    let ((needed, needed_rays), (even, even_rays)) = (mean(true), mean(false));
+    let ((needed, needed_rays), (even, even_rays)) = (mean(Dealing::ByNeed), mean(Dealing::Even));
     // What is spent is what was asked for but for bare samples, which have none of these rays, and outlines, which may have more.
     assert!((0.85..1.1).contains(&(needed_rays / even_rays)), "{needed_rays} {even_rays}");
     // A metal dragon has 0.6 of it (benches/README.md: 1.59 times the efficiency); eight renders tell either error to 10 %.
@@ -93,10 +94,12 @@ fn numbers_depend_on_no_thread() {
     assert!(one.stats.spp_least < 16 && one.stats.spp > 16, "{} {}", one.stats.spp_least, one.stats.spp);
     assert_eq!([one.stats.spp_least, one.stats.spp], [two.stats.spp_least, two.stats.spp]);
     assert!(one.film == two.film, "the same film by one thread and by two");
-    for (by_need, moments, spp) in [(false, false, 16), (true, true, 16), (true, false, 3)] {
+    for (dealing, moments, spp) in
+        [(Dealing::Even, false, 16), (Dealing::ByNeed, true, 16), (Dealing::ByNeed, false, 3)]
+    {
         let even =
-            bench.render(|s| (s.by_need, s.moments, s.spp, s.outlines) = (by_need, moments, spp, Some(1)));
-        assert_eq!([even.stats.spp_least, even.stats.spp], [spp; 2], "{by_need} {moments} {spp}");
+            bench.render(|s| (s.dealing, s.moments, s.spp, s.outlines) = (dealing, moments, spp, Some(1)));
+        assert_eq!([even.stats.spp_least, even.stats.spp], [spp; 2], "{dealing:?} {moments} {spp}");
         assert!(even.film.window().pixels().all(|(x, y)| even.film.sample_count(x, y) == u64::from(spp)));
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::common::{integrator, scene};
 use skylit::integrators::Integrator;
+use skylit::render::dealing::Dealing;
 use skylit::render::settings::RenderSettings;
 use skylit::render::{Renderer, Silent};
 use skylit::sampler::Sampler;
@@ -59,7 +60,8 @@ impl Bench {
     /// Luminances of a render.
     fn picture(&self, sampler: Sampler, spp: u32, moments: bool, seed: u64) -> Vec<f64> {
         let usual = RenderSettings::new([SIDE, SIDE]);
-        let settings = RenderSettings { sampler, spp, moments, seed, threads: 2, by_need: false, ..usual };
+        let settings =
+            RenderSettings { sampler, spp, moments, seed, threads: 2, dealing: Dealing::Even, ..usual };
         let renderer = Renderer { integrator: self.integrator.clone(), settings };
         let film = renderer.render(&self.scene, &Silent).unwrap().film;
         film.window().pixels().map(|(x, y)| f64::from(film.mean(x, y).luminance())).collect()

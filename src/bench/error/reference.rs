@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::image::picture::{Picture, SampleKind};
 use crate::image::read::read_planes;
 use crate::image::write::{WriteOptions, write_picture};
+use crate::render::dealing::Dealing;
 use crate::render::{Progress, Renderer};
 use crate::scene::Scene;
 use std::path::{Path, PathBuf};
@@ -89,7 +90,7 @@ impl Reference {
         // What is on trial does not stand as judge.
         settings.skip_background = false;
         settings.outlines = Some(1);
-        settings.by_need = false;
+        settings.dealing = Dealing::Even;
         settings.moments = true;
         let renderer = Renderer { integrator: renderer.integrator.clone(), settings };
         let film = renderer.render(scene, progress)?.film;

@@ -60,8 +60,7 @@ pub static KEYS: &[Key] = &[
         s.settings.check()
     }),
     Key::new("dealing", "samples by need, or as many for each pixel", |s, v| {
-        let all = [("by-need", (true, true)), ("by-guess", (true, false)), ("even", (false, true))];
-        (s.settings.by_need, s.settings.doubts) = choose("dealing", v, &all)?;
+        s.settings.dealing = v.parse()?;
         Ok(())
     }),
     Key::new("moments", "whether a render knows its own error", |s, v| {

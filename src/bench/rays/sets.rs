@@ -11,6 +11,7 @@ use crate::integrators::{CameraBatch, Integrator, PathResults, Workspace};
 use crate::math::aabb::Aabb;
 use crate::math::frame::Frame;
 use crate::render::block::{Job, Worker};
+use crate::render::dealing::Dealing;
 use crate::render::film::Film;
 use crate::render::settings::RenderSettings;
 use crate::sampler::{Dim, Sampler, ray_key};
@@ -219,7 +220,7 @@ pub(super) fn camera_rays(scene: &Scene, count: usize) -> Vec<RayBatch> {
     // A small picture has more samples a pixel instead.
     let spp = count.div_ceil(pixels).next_multiple_of(2).max(SPP as usize) as u32;
     let settings =
-        RenderSettings { spp, threads: 1, seed: SEED, by_need: false, ..RenderSettings::new(size) };
+        RenderSettings { spp, threads: 1, seed: SEED, dealing: Dealing::Even, ..RenderSettings::new(size) };
     let tiles: Vec<_> = Film::new(size[0], size[1], settings.crop).tiles().collect();
     let of_whole_tiles = count.div_ceil(16 * 16 * spp as usize);
     // Few rays are parts of more tiles: a handful of whole ones could all miss.

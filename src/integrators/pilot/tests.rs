@@ -1,6 +1,7 @@
 use super::*;
 use crate::base::pixel_rect::PixelRect;
 use crate::integrators::Integrator;
+use crate::render::dealing::Dealing;
 use crate::render::outlines::Outlines;
 use crate::render::settings::RenderSettings;
 use crate::render::{Renderer, Silent};
@@ -31,7 +32,7 @@ fn shown(scene: &Scene, tracer: &PathTracer, pixels: &[[u32; 2]]) -> trial::Tria
     let integrator: Arc<dyn Integrator> = Arc::new(tracer.clone());
     let settings = RenderSettings {
         spp: 32,
-        by_need: false,
+        dealing: Dealing::Even,
         outlines: Some(1),
         pilot: false,
         ..RenderSettings::new(SIZE)

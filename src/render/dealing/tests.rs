@@ -111,7 +111,7 @@ fn what_neighbours_do_not_foretell_is_not_gone_by() {
         assert!(RECT.pixels().all(|(x, y)| counts.of(x, y) == spp), "{spp}");
     }
     // Unless that is wanted.
-    let blindly = RenderSettings { doubts: false, ..of(16) };
+    let blindly = RenderSettings { dealing: Dealing::ByGuess, ..of(16) };
     let counts = notes(&mut chance).deal(8, &blindly, None);
     assert!(RECT.pixels().any(|(x, y)| counts.of(x, y) > 16));
     // One colour of the chessboard shows where noise is, the other is alike all over: only the former is believed, which is

@@ -7,6 +7,7 @@ use skylit::base::registry::{self, Node, Params, Value};
 use skylit::integrators::{self, Integrator};
 use skylit::render::RenderStats;
 use skylit::render::adaptive::{Part, Target};
+use skylit::render::dealing::Dealing;
 use skylit::render::settings::RenderSettings;
 use skylit::sampler::Sampler;
 use skylit::scene::Scene;
@@ -215,7 +216,7 @@ impl Plan {
                 sampler: Sampler::Independent,
                 skip_background: false,
                 outlines: Some(1),
-                by_need: false,
+                dealing: Dealing::Even,
                 moments: false,
                 pilot: false,
                 threads: 1,
@@ -332,13 +333,9 @@ pub fn techniques() -> Vec<Technique> {
             |s| s.spared > 0,
             8,
         ),
-        seen(
-            by("dealing by guess", |p| (p.settings.by_need, p.settings.doubts) = (true, false)),
-            by_need,
-            10,
-        ),
+        seen(by("dealing by guess", |p| p.settings.dealing = Dealing::ByGuess), by_need, 10),
         // In the others what neighbours show foretells nothing.
-        seen(by("dealing by need", |p| p.settings.by_need = true), by_need, 7),
+        seen(by("dealing by need", |p| p.settings.dealing = Dealing::ByNeed), by_need, 7),
         seen(Technique { renders: 10, ..by("target", |p| p.set_target(p.targets[0])) }, by_need, 8),
         seen(by("all defaults", Plan::set_defaults), |s| s.rounds == 2, 10),
         seen(
