@@ -81,8 +81,8 @@ impl Tracing<'_> {
         all
     }
 
-    /// The camera's rays are spread as the render's are: what the surfaces of a pixel differ by is noise that no more samples of light take
-    /// away, so that the dearer strategies must not be credited with it.
+    /// The camera's rays are spread as the render's are: what the surfaces of a pixel differ by is noise that no more samples
+    /// of light take away, so that the dearer strategies must not be credited with it.
     fn run(&self, tracer: &PathTracer, pixels: &[[u32; 2]], memory: &mut Memory) -> Trial {
         let Memory { batch, work, out } = memory;
         let camera = &self.scene.camera;
