@@ -5,8 +5,9 @@
 
 Each renderer runs in a process of its own, one after the other, and writes OUTDIR/NAME.json; then all records that stand
 in OUTDIR are drawn as OUTDIR/all.html and all.txt, a plot of each scene as SCENE.svg. Where one fails, the others go on.
-Where one of --spp, --replicates and --reference-spp is not given, each renderer takes what is good for it (see LADDERS): which
-takes half an hour or so for eight scenes, where references are kept. They are in DIR/references. --threads and --size are handed on as they are.
+Where one of --spp, --replicates and --reference-spp is not given, each renderer takes what is good for it (see LADDERS):
+half an hour or so for eight scenes, where references are kept. They are in DIR/references. --threads and --size are handed
+on as they are.
 With --keep, renderers whose record OUTDIR has already are not measured again, so that a run goes on with the one at which it
 was stopped: records bear their name once they are whole (till then NAME.json.part).
 

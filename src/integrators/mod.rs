@@ -138,8 +138,9 @@ impl PathResults {
     }
 }
 
-/// What a camera ray's surface point takes beside the rays that leave it, in units of some 48 ns of a thread on the machine of
-/// benches/README.md. These costs fit even renders of four scenes with several strategies.
+/// What a camera ray's surface point takes beside the rays that leave it, in units of some 48 ns of a render by two threads on
+/// the machine of benches/README.md. These costs were fitted to even renders of three diffuse scenes with several strategies; on
+/// metal, a light sample that is not worth its ray takes something too, which no count of rays tells.
 const SAMPLE_COST: f64 = 4.0;
 /// The same of a coherent camera ray, a scattered ray with the surface that it may meet, and a shadow ray with its light
 /// sample.

@@ -6,8 +6,8 @@
 //! ones need off the white. Points of different pixels are independent where samples are dealt by need, hence numbers and
 //! samples of a pixel are, and its mean is unbiased (but for what the two mean costs of a sample, which are counted over the
 //! whole film, know of one pixel: of the order of one over the number of pixels). How far neighbours are believed, the other
-//! colour says, too (`trust`). Totals are powers of two, or `spp` where neighbours
-//! are not believed, of one sequence of points from the first sample to the last.
+//! colour says, too (`trust`). Totals are powers of two, or `spp` where neighbours are not believed, of one sequence of points
+//! from the first sample to the last.
 //!
 //! Tried: a quarter of the samples first (what no neighbour foretells, a twig or a far lamp, costs more than is gained); all
 //! twelve neighbours alike (up to 1.2 times the error); the four nearest alone (8 times under the stars of `nebula`).

@@ -12,7 +12,7 @@ use judge::{error, means};
 
 const SIZE: [u32; 2] = [96, 72];
 
-/// A ball on a floor below stars: soft shadows, bounced light where paths go on, and a rim.
+/// A ball on a floor below a sky with a sun: shadows, bounced light where paths go on, and a rim.
 fn ball_on_floor() -> Scene {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("ball.toml");
@@ -86,8 +86,9 @@ fn trials_foretell_the_errors_of_renders() {
         });
         for (k, (other, strategy)) in (1..).zip(others.iter().zip(&strategies[1..])) {
             let (foretold, is) = (other.0 / both.0, other.1 / both.1);
-            // With eight scenes the two agree within a fifth. A pixel that a rim runs close by has a noise that falls faster
-            // than others, and is half of what is left by eight light samples: groups of 8 are less even than 32 samples.
+            // Errors of groups of 8 are 1.1 to 1.9 times those of 32 samples, which are more even; what differs from strategy to
+            // strategy is at most a fifth, but on the ball in direct light: there the noise of one sample of each falls that
+            // fast (0.223 to 0.129), that of eight light samples hardly (0.032 to 0.030).
             let tolerance: f64 = if (max_depth, number, k) == (1, 0, 1) { 1.8 } else { 1.25 };
             let off = (foretold / is).ln().abs();
             assert!(off < tolerance.ln(), "depth {max_depth}, {strategy:?}: {foretold} for {is}");
