@@ -11,6 +11,7 @@ pub mod cameras;
 pub mod check;
 pub mod cli;
 pub mod color;
+pub mod compare;
 pub mod crosscheck;
 pub mod error;
 pub mod formats;

@@ -5,6 +5,7 @@ pub mod denoise;
 mod exr_read;
 mod exr_write;
 mod hdr;
+pub mod load;
 pub mod picture;
 pub mod read;
 mod srgb8;

@@ -1,0 +1,5 @@
+//! L4: how far a picture is from another, by many measures, and whether the difference is more than noise.
+
+pub mod flip;
+pub mod ssim;
+pub mod statistics;
