@@ -3,6 +3,7 @@
 use super::print;
 use crate::accel;
 use crate::base::registry::ParamSpec;
+use crate::compare::metrics;
 use crate::error::{Error, Result, unknown_name};
 use crate::formats::families::{Families, Family, describe};
 use crate::image::tonemap::ToneMap;
@@ -45,6 +46,7 @@ fn families() -> Vec<Family> {
     let mut all = Families::registered().all();
     all.push(Family::of_names("aov", aovs.chain(film_layers)));
     all.push(Family::of_names("backend", accel::KERNELS.iter().map(|k| (k.name, k.doc))));
+    all.push(Family::of_names("metric", metrics::REGISTRY.iter().map(|m| (m.name, m.doc))));
     all.push(Family::of_names("tonemap", ToneMap::ALL.map(|t| (t.name(), t.doc()))));
     all
 }

@@ -4,6 +4,7 @@ mod args;
 mod bench;
 mod bench_error;
 mod check;
+mod compare;
 mod convert;
 mod crosscheck;
 mod denoise;
@@ -82,6 +83,8 @@ enum Verb {
     Info(Box<info::InfoArgs>),
     /// Measure: how fast kernels answer the same rays, how fast renders come near the truth
     Bench(Box<bench::BenchArgs>),
+    /// Hold pictures against a reference: figures, likely causes, a page to look at
+    Compare(Box<compare::CompareArgs>),
     /// Send every ray of a render through every kernel, judge the differences, and compare the pictures
     Crosscheck(Box<crosscheck::CrosscheckArgs>),
     /// Certify that rays neither leak, nor meet what they left, nor jump over what is near, on every kernel
@@ -134,6 +137,7 @@ fn run() -> Result<(), Failure> {
         Verb::Render(args) => render::run(args, &setting)?,
         Verb::Info(args) => info::run(args, &setting)?,
         Verb::Bench(args) => bench::run(args, &setting)?,
+        Verb::Compare(args) => compare::run(args, &setting)?,
         Verb::Crosscheck(args) => crosscheck::run(args, &setting)?,
         Verb::Check(args) => check::run(args, &setting)?,
         Verb::Convert(args) => convert::run(args, &setting)?,

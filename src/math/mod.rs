@@ -2,6 +2,7 @@
 
 pub mod aabb;
 pub mod bounds;
+pub mod exact_sum;
 pub mod frame;
 pub mod pages;
 pub mod polygon;

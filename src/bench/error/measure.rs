@@ -1,11 +1,8 @@
 //! How far a film is from the truth.
 
+use crate::compare::metrics::EPSILON;
 use crate::render::film::Film;
 use serde::{Deserialize, Serialize};
-
-/// Part of the squared mean luminance that is added to the squared reference in [`Errors::relmse`]: what is ten times
-/// darker than the picture on average counts no more than that.
-pub const EPSILON: f64 = 0.01;
 
 /// A pixel is one of a surface where the reference's alpha is at least this.
 const COVERED: f32 = 0.99;

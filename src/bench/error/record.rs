@@ -32,7 +32,7 @@ pub struct SceneRecord {
     pub name: String,
     /// Of the film, pixels.
     pub size: [u32; 2],
-    /// See [`super::measure::EPSILON`].
+    /// See [`crate::compare::metrics::EPSILON`].
     pub epsilon: f64,
     /// The truth.
     pub reference: ReferenceRecord,

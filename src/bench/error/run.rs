@@ -1,11 +1,12 @@
 //! Renders all variants in turn: run by run, sample count by sample count, forwards and backwards, so that whatever
 //! drifts on the machine meets all alike.
 
-use super::measure::{EPSILON, Truth};
+use super::measure::Truth;
 use super::record::{Point, Run, SceneRecord, Series};
 use super::reference::{Kept, Reference};
 use super::sweep::{Subject, label, truth_settings};
 use crate::bench::Progress;
+use crate::compare::metrics::EPSILON;
 use crate::error::Result;
 use crate::render::film::Film;
 use crate::render::{Renderer, Silent};

@@ -1,9 +1,10 @@
 use super::analyse::{Curve, speed_up};
-use super::measure::{EPSILON, Errors, PixelSet, Sets, Truth};
+use super::measure::{Errors, PixelSet, Sets, Truth};
 use super::record::{FORMAT, Point, Record, ReferenceRecord, Run, SceneRecord, Series};
 use super::run::{Plan, TruthPlan, measure};
 use super::sweep::{Subject, Sweep, combinations, truth_settings};
 use crate::bench::Silent;
+use crate::compare::metrics::EPSILON;
 use crate::render::settings::RenderSettings;
 use crate::scene::build::BuildOptions;
 

@@ -3,6 +3,7 @@
 mod bad_input;
 mod bench;
 mod bench_error;
+mod compare;
 mod crosscheck;
 mod denoise;
 mod folder;
@@ -23,7 +24,7 @@ fn usage_is_told_on_the_right_stream() {
     assert!(bare.stderr.contains("Usage: skylit"));
     let help = f.run("--help");
     assert_eq!((help.code, help.stderr.as_str()), (0, ""));
-    for verb in ["render", "info", "bench", "crosscheck", "check", "list", "completions", "man"] {
+    for verb in ["render", "info", "bench", "compare", "crosscheck", "check", "list", "completions", "man"] {
         assert!(help.stdout.contains(verb));
         assert!(f.run(&format!("{verb} --help")).succeeds().stdout.contains("--threads"));
     }

@@ -1,0 +1,21 @@
+//! Peak signal-to-noise ratio.
+
+use super::{Better, Metric, Outcome, pointwise};
+
+/// The row of the table.
+pub const METRIC: Metric = Metric {
+    name: "psnr",
+    title: "PSNR",
+    doc: "10 log10(peak^2 / MSE): the RMSE as a ratio to the largest value, in decibels. 20 dB are a tenth, 40 dB a hundredth. Between \
+          8-bit pictures the peak is 255; of radiance it is the reference's largest value, which one bright pixel can decide: \
+          --peak sets it.",
+    better: Better::Higher,
+    unit: "dB",
+    eval: |input| {
+        let (peak, note) = input.peak();
+        let squares = pointwise::means(input.pair, |r, t| (t - r).powi(2));
+        let decibels = |mse: f64| if mse == 0.0 { f64::INFINITY } else { 10.0 * (peak * peak / mse).log10() };
+        let value = decibels(squares.iter().sum::<f64>() / squares.len().max(1) as f64);
+        Ok(Outcome { value, channels: squares.into_iter().map(decibels).collect(), note, map: None })
+    },
+};

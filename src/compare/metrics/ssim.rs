@@ -1,0 +1,9 @@
+use super::{Better, Metric, Skipped};
+pub const METRIC: Metric = Metric {
+    name: "ssim",
+    title: "ssim",
+    doc: "",
+    better: Better::Lower,
+    unit: "",
+    eval: |_| Err(Skipped("not built yet".into())),
+};
