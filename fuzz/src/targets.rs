@@ -4,6 +4,7 @@
 use skylit::base::image_data::{ImageData, Texels};
 use skylit::base::mesh_data::MeshData;
 use skylit::formats::{self, LoadOptions, NamedFiles, obj, ply, source};
+use skylit::image::load;
 use skylit::image::read::{decode_image, decode_planes};
 use skylit::{Error, Result};
 use std::path::Path;
@@ -11,8 +12,9 @@ use std::sync::LazyLock;
 
 /// Names of all targets.
 #[allow(dead_code, reason = "the fuzz crate names its targets itself")]
-pub const TARGETS: [&str; 12] =
-    ["obj", "mtl", "ply", "toml", "seed", "course", "png", "jpg", "hdr", "exr", "gzip", "zstd"];
+pub const TARGETS: [&str; 14] = [
+    "obj", "mtl", "ply", "toml", "seed", "course", "png", "jpg", "hdr", "exr", "tiff", "pfm", "gzip", "zstd",
+];
 
 /// Longest message of an error, in bytes: it may quote what it found, but not a whole file.
 const LONGEST_MESSAGE: usize = 4096;
@@ -42,6 +44,9 @@ pub fn run(target: &str, data: &[u8]) -> bool {
             }
             picture(&data) || planes.is_some()
         }
+        "tiff" if data.first() == Some(&b'M') => picture(&begin(data, b"MM\0*")),
+        "tiff" => picture(&begin(data, b"II*\0")),
+        "pfm" => picture(&begin(data, b"P")),
         "gzip" => unpacked(&begin(data, b"\x1f\x8b")),
         "zstd" => unpacked(&begin(data, b"\x28\xb5\x2f\xfd")),
         _ => panic!("no target {target}"),
@@ -88,6 +93,12 @@ fn scene(name: &str, data: &[u8]) -> bool {
 }
 
 fn picture(data: &[u8]) -> bool {
+    let loaded = accepted(load::decode(Path::new("a.picture"), data, &load::LoadOptions::default()));
+    if let Some(loaded) = &loaded {
+        let picture = &loaded.picture;
+        assert!(!picture.planes.is_empty() && !loaded.layers.is_empty());
+        assert!(picture.planes.iter().all(|p| p.data.len() == picture.width * picture.height));
+    }
     let Some(image) = accepted(decode_image(Path::new("a.picture"), data, None)) else { return false };
     let ImageData { width, height, texels } = image;
     let count = match &texels {

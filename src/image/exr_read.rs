@@ -1,6 +1,7 @@
 //! OpenEXR pictures through the `exr` crate's block interface: only the wanted layer's largest level is
 //! decompressed, and only the wanted channels are kept.
 
+use super::exr_layers::{self, Layer};
 use super::picture::{Picture, SampleKind};
 use super::read::{DEFLATE_RATIO, check_size, room_for};
 use crate::base::image_data::{ImageData, Texels};
@@ -18,8 +19,7 @@ use rayon::prelude::*;
 use std::io::Cursor;
 use std::path::Path;
 
-/// The colour channels of the first layer that has them: `R G B` (in any case), else `<prefix>.R .G .B`
-/// (a prefix that ends in `Combined`, as Blender's, goes first), else `Y` as gray.
+/// The colour of the layer that most likely is the picture (see [`exr_layers::main`]); `Y` alone is gray.
 pub(super) fn decode_colour(path: &Path, bytes: &[u8]) -> Result<ImageData> {
     let reader = open(path, bytes)?;
     let choice = checked_colour(path, bytes, reader.headers())?;
@@ -45,27 +45,67 @@ pub(super) fn dimensions(path: &Path, bytes: &[u8]) -> Result<(usize, usize)> {
 }
 
 fn checked_colour(path: &Path, bytes: &[u8], headers: &[Header]) -> Result<ColourChoice> {
-    let choice = choose_colour(headers)
+    let layers = exr_layers::layers(headers);
+    let choice = exr_layers::main(&layers)
+        .and_then(|layer| layer.colour().map(|channels| ColourChoice { layer: layer.part, channels }))
         .ok_or_else(|| Error::content(path, format!("no channels R, G, B or Y; has: {}", names(headers))))?;
     check_layer(path, bytes, &headers[choice.layer])?;
     Ok(choice)
 }
 
-/// Every channel of the first layer, with text attributes as metadata.
+/// The layer of this name, or the one that most likely is the picture, by bare names, with text attributes as
+/// metadata; its full name, and all layers.
+pub(super) fn decode_named(
+    path: &Path,
+    bytes: &[u8],
+    name: Option<&str>,
+) -> Result<(Picture, Layer, Vec<Layer>)> {
+    let reader = open(path, bytes)?;
+    let layers = exr_layers::layers(reader.headers());
+    let layer = match name {
+        Some(name) => exr_layers::named(&layers, name).map_err(|message| Error::content(path, message))?,
+        None => exr_layers::main(&layers).ok_or_else(|| damaged(path, "it has no channels"))?.clone(),
+    };
+    let picture = decode_channels(path, bytes, reader, layer.part, &layer.channels)?;
+    Ok((picture, layer, layers))
+}
+
+/// Every channel of the first part, with text attributes as metadata.
 pub(super) fn decode_planes(path: &Path, bytes: &[u8]) -> Result<Picture> {
     let reader = open(path, bytes)?;
-    let header = &reader.headers()[0];
+    let list = &reader.headers()[0].channels.list;
+    let channels: Vec<_> = list.iter().enumerate().map(|(i, c)| (c.name.to_string(), i)).collect();
+    decode_channels(path, bytes, reader, 0, &channels)
+}
+
+/// Channels of one part, each by the name that is given with its index.
+fn decode_channels(
+    path: &Path,
+    bytes: &[u8],
+    reader: Reader<Cursor<&[u8]>>,
+    part: usize,
+    channels: &[(String, usize)],
+) -> Result<Picture> {
+    let header = &reader.headers()[part];
     check_layer(path, bytes, header)?;
     let (width, height) = (header.layer_size.x(), header.layer_size.y());
-    let _room = room_for(path, (width, height), 4 * header.channels.list.len())?;
+    let _room = room_for(path, (width, height), 4 * channels.len())?;
     let mut picture = Picture::new(width, height);
     picture.set_frame_from(header);
-    for channel in &header.channels.list {
-        let kind = if channel.sample_type == SampleType::F16 { SampleKind::Half } else { SampleKind::Float };
-        picture.push(channel.name.to_string(), kind, vec![0.0; width * height]);
+    let mut plane_of = vec![None; header.channels.list.len()];
+    for (name, index) in channels {
+        if picture.plane(name).is_some() {
+            return Err(damaged(path, format!("two channels are called {name}")));
+        }
+        let half = header.channels.list[*index].sample_type == SampleType::F16;
+        let kind = if half { SampleKind::Half } else { SampleKind::Float };
+        plane_of[*index] = Some(picture.planes.len());
+        picture.push(name, kind, vec![0.0; width * height]);
     }
-    decode_layer(path, reader, 0, |channel, at, values| {
-        picture.planes[channel].data[at..at + values.len()].copy_from_slice(values);
+    decode_layer(path, reader, part, |channel, at, values| {
+        if let Some(plane) = plane_of[channel] {
+            picture.planes[plane].data[at..at + values.len()].copy_from_slice(values);
+        }
     })?;
     Ok(picture)
 }
@@ -119,35 +159,6 @@ struct ColourChoice {
     layer: usize,
     /// Channel indices of red, green and blue.
     channels: [usize; 3],
-}
-
-fn choose_colour(headers: &[Header]) -> Option<ColourChoice> {
-    let find = |header: &Header, name: &str| {
-        header.channels.list.iter().position(|c| c.name.to_string().eq_ignore_ascii_case(name))
-    };
-    let triple = |header: &Header, prefix: &str| -> Option<[usize; 3]> {
-        let at = |c| find(header, &format!("{prefix}{c}"));
-        Some([at("R")?, at("G")?, at("B")?])
-    };
-    let in_any = |choose: &dyn Fn(&Header) -> Option<[usize; 3]>| {
-        headers
-            .iter()
-            .enumerate()
-            .find_map(|(layer, h)| choose(h).map(|channels| ColourChoice { layer, channels }))
-    };
-    let prefixes = |h: &Header| -> Vec<String> {
-        h.channels
-            .list
-            .iter()
-            .filter_map(|c| c.name.to_string().strip_suffix(".R").map(|p| p.to_owned() + "."))
-            .collect()
-    };
-    in_any(&|h| triple(h, ""))
-        .or_else(|| {
-            in_any(&|h| prefixes(h).iter().filter(|p| p.ends_with("Combined.")).find_map(|p| triple(h, p)))
-        })
-        .or_else(|| in_any(&|h| prefixes(h).iter().find_map(|p| triple(h, p))))
-        .or_else(|| in_any(&|h| find(h, "Y").map(|c| [c; 3])))
 }
 
 fn check_layer(path: &Path, bytes: &[u8], header: &Header) -> Result<()> {

@@ -1,8 +1,8 @@
 //! Radiance RGBE pictures (G. Ward, "Real Pixels", Graphics Gems II, 1991; the run-length forms as in
 //! Radiance's `filefmts.pdf`): flat, old and new run-length coding, all eight orientations.
 
+use super::raw::{Raw, Samples};
 use super::read::{check_size, room_for};
-use crate::base::image_data::{ImageData, Texels};
 use crate::error::{Error, Result};
 use std::path::Path;
 
@@ -29,11 +29,12 @@ struct Layout {
 }
 
 /// Decodes a whole file. The `EXPOSURE` of the header is not undone (as other renderers do); it is logged.
-pub(super) fn decode(path: &Path, bytes: &[u8]) -> Result<ImageData> {
+pub(super) fn decode(path: &Path, bytes: &[u8]) -> Result<Raw> {
     let header = parse_header(path, bytes)?;
     let layout = &header.layout;
     let _room = room_for(path, (layout.width, layout.height), 12)?;
-    let mut texels = vec![[0f32; 3]; layout.width * layout.height];
+    let mut samples = vec![0f32; 3 * layout.width * layout.height];
+    let (texels, _) = samples.as_chunks_mut::<3>();
     let scale: Vec<f32> = (0..256).map(exponent_scale).collect();
     let mut rows = RowReader { data: header.data, row: vec![[0; 4]; header.run] };
     for line in 0..header.lines {
@@ -47,7 +48,7 @@ pub(super) fn decode(path: &Path, bytes: &[u8]) -> Result<ImageData> {
             texels[at as usize] = [f32::from(r) * s, f32::from(g) * s, f32::from(b) * s];
         }
     }
-    Ok(ImageData { width: layout.width, height: layout.height, texels: Texels::F32(texels) })
+    Ok(Raw { width: layout.width, height: layout.height, channels: 3, samples: Samples::F32(samples) })
 }
 
 /// Width and height, by the header.

@@ -1,9 +1,13 @@
 //! Pictures as they stand in their files: every channel layout and layer of EXR, and of other formats the stored values,
 //! not yet decoded, with the word of how they were stored.
 
+use super::kind::{Kind, sniff};
 use super::picture::Picture;
+use super::read::{decode_raw, guarded, read_bytes};
+use super::{exr_read, hdr, pfm, tiff_read};
 use crate::base::image_data::Encoding;
 use crate::error::{Error, Result};
+use image::ImageFormat;
 use std::path::Path;
 
 /// What to take from a file.
@@ -43,10 +47,44 @@ pub struct Loaded {
     pub layers: Vec<(String, Vec<String>)>,
 }
 
-/// Reads a picture.
+/// Reads a picture. Alpha is kept where there is one: multiplied into the colour in EXR, beside it in whole numbers.
 ///
 /// # Errors
 /// As [`super::read::read_image`]; a layer that the file does not have.
-pub fn load(path: &Path, _options: &LoadOptions) -> Result<Loaded> {
-    Err(Error::Internal(format!("{}: not built yet", path.display())))
+pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded> {
+    decode(path, &read_bytes(path)?, options)
 }
+
+/// As [`load`], from the bytes of a file; `path` is for messages alone.
+///
+/// # Errors
+/// As [`load`].
+pub fn decode(path: &Path, bytes: &[u8], options: &LoadOptions) -> Result<Loaded> {
+    let kind = sniff(path, bytes)?;
+    if kind == Kind::Exr {
+        let layer = options.layer.as_deref();
+        let (picture, layer, layers) = guarded(path, || exr_read::decode_named(path, bytes, layer))?;
+        let names = |(name, _): (String, usize)| name;
+        let layers = layers.into_iter().map(|l| (l.name, l.channels.into_iter().map(names).collect()));
+        return Ok(Loaded { picture, stored: Stored::Float, layer: layer.name, layers: layers.collect() });
+    }
+    if let Some(layer) = options.layer.as_deref().filter(|l| !l.is_empty()) {
+        let message = format!("no layer \"{layer}\": this is no EXR picture, and only those have layers");
+        return Err(Error::content(path, message));
+    }
+    let raw = guarded(path, || match kind {
+        Kind::Png => decode_raw(path, bytes, ImageFormat::Png),
+        Kind::Jpeg => decode_raw(path, bytes, ImageFormat::Jpeg),
+        Kind::Hdr => hdr::decode(path, bytes),
+        Kind::Tiff => tiff_read::decode(path, bytes),
+        Kind::Pfm => pfm::decode(path, bytes),
+        Kind::Exr => unreachable!("read above"),
+    })?;
+    let encoding = options.encoding.unwrap_or_default();
+    let stored = raw.bits().map_or(Stored::Float, |bits| Stored::Integer { bits, encoding });
+    let layers = vec![(String::new(), raw.names().iter().map(|n| (*n).to_owned()).collect())];
+    Ok(Loaded { picture: raw.into_picture(), stored, layer: String::new(), layers })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,12 +1,13 @@
-//! Reads PNG, JPEG, Radiance HDR and EXR pictures. The format is told by content, not by file name.
+//! Reads PNG, JPEG, Radiance HDR, EXR, TIFF and PFM pictures. The format is told by content, not by file name.
 //!
 //! Every size is checked by header before anything of that size is allocated: against absolute caps, and
 //! against what a file of that length can hold at the format's best compression.
 
+use super::kind::{Kind, LONGEST_MAGIC, PNG_MAGIC, sniff};
 use super::picture::{Picture, SampleKind};
-use super::{exr_read, hdr};
+use super::raw::{Raw, curve16, eight_bits};
+use super::{exr_read, hdr, pfm, tiff_read};
 use crate::base::image_data::{Encoding, ImageData, Texels};
-use crate::color::srgb_to_linear;
 use crate::error::{Error, Result};
 use crate::memory::{self, Room};
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, Limits};
@@ -20,11 +21,6 @@ pub const MAX_SIDE: u64 = 65_536;
 
 /// Most pixels that are read from one file (a 32768 x 8192 sky).
 pub const MAX_PIXELS: u64 = 1 << 28;
-
-const PNG_MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
-
-/// Bytes that tell every format.
-const LONGEST_MAGIC: u64 = 10;
 
 /// Deflate packs at most 1032 bytes into one (RFC 1951: a 258-byte match in two bits).
 pub(super) const DEFLATE_RATIO: u64 = 1032;
@@ -73,12 +69,14 @@ pub fn check_kind(path: &Path) -> Result<()> {
 /// # Errors
 /// As [`read_image`], but for damage after the header.
 pub fn dimensions(path: &Path, bytes: &[u8]) -> Result<(usize, usize)> {
-    let format = sniff(path, bytes)?;
-    guarded(path, || match format {
-        Format::Png => image_decoder(path, bytes, ImageFormat::Png).map(|d| size_of(&d)),
-        Format::Jpeg => image_decoder(path, bytes, ImageFormat::Jpeg).map(|d| size_of(&d)),
-        Format::Hdr => hdr::dimensions(path, bytes),
-        Format::Exr => exr_read::dimensions(path, bytes),
+    let kind = sniff(path, bytes)?;
+    guarded(path, || match kind {
+        Kind::Png => image_decoder(path, bytes, ImageFormat::Png).map(|d| size_of(&d)),
+        Kind::Jpeg => image_decoder(path, bytes, ImageFormat::Jpeg).map(|d| size_of(&d)),
+        Kind::Hdr => hdr::dimensions(path, bytes),
+        Kind::Exr => exr_read::dimensions(path, bytes),
+        Kind::Tiff => tiff_read::dimensions(path, bytes),
+        Kind::Pfm => pfm::dimensions(path, bytes),
     })
 }
 
@@ -88,17 +86,29 @@ pub fn dimensions(path: &Path, bytes: &[u8]) -> Result<(usize, usize)> {
 /// As [`read_image`].
 pub fn decode_image(path: &Path, bytes: &[u8], encoding: Option<Encoding>) -> Result<ImageData> {
     let encoding = encoding.unwrap_or_default();
-    let format = sniff(path, bytes)?;
-    guarded(path, || match format {
-        Format::Png => decode_with_image(path, bytes, ImageFormat::Png, encoding),
-        Format::Jpeg => decode_with_image(path, bytes, ImageFormat::Jpeg, encoding),
-        Format::Hdr => hdr::decode(path, bytes),
-        Format::Exr => exr_read::decode_colour(path, bytes).map(|image| finish(path, image)),
+    let kind = sniff(path, bytes)?;
+    guarded(path, || match kind {
+        Kind::Png => decode_with_image(path, bytes, ImageFormat::Png, encoding),
+        Kind::Jpeg => decode_with_image(path, bytes, ImageFormat::Jpeg, encoding),
+        Kind::Hdr => hdr::decode(path, bytes).map(|raw| raw.into_image(encoding)),
+        Kind::Exr => exr_read::decode_colour(path, bytes).map(|image| finish(path, image)),
+        Kind::Tiff => tiff_read::decode(path, bytes).map(|raw| finish(path, raw.into_image(encoding))),
+        Kind::Pfm => pfm::decode(path, bytes).map(|raw| finish(path, raw.into_image(encoding))),
     })
 }
 
+/// Samples as a PNG or JPEG file holds them.
+pub(super) fn decode_raw(path: &Path, bytes: &[u8], format: ImageFormat) -> Result<Raw> {
+    let decoder = image_decoder(path, bytes, format)?;
+    let channels = usize::from(decoder.color_type().channel_count());
+    // Decoded, and then as planes of floats.
+    let bytes_per_pixel = channels * (4 + if is_deep(&decoder) { 2 } else { 1 });
+    let _room = room_for(path, size_of(&decoder), bytes_per_pixel)?;
+    DynamicImage::from_decoder(decoder).map(Raw::from).map_err(|e| damaged(path, &e))
+}
+
 /// A fault of a library that decodes is damage of the picture: nothing of what it worked on is looked at again.
-fn guarded<T>(path: &Path, decode: impl FnOnce() -> Result<T>) -> Result<T> {
+pub(super) fn guarded<T>(path: &Path, decode: impl FnOnce() -> Result<T>) -> Result<T> {
     catch_unwind(AssertUnwindSafe(decode)).unwrap_or_else(|_| {
         Err(Error::content(path, "damaged picture: its decoder came to a state it does not expect"))
     })
@@ -118,7 +128,7 @@ pub fn read_planes(path: &Path) -> Result<Picture> {
 /// # Errors
 /// As [`read_image`].
 pub fn decode_planes(path: &Path, bytes: &[u8]) -> Result<Picture> {
-    if sniff(path, bytes)? == Format::Exr {
+    if sniff(path, bytes)? == Kind::Exr {
         return guarded(path, || exr_read::decode_planes(path, bytes));
     }
     let image = decode_image(path, bytes, None)?;
@@ -131,28 +141,6 @@ pub fn decode_planes(path: &Path, bytes: &[u8]) -> Result<Picture> {
     picture.push("G", SampleKind::Float, texels.iter().map(|t| t.g).collect());
     picture.push("B", SampleKind::Float, texels.iter().map(|t| t.b).collect());
     Ok(picture)
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Format {
-    Png,
-    Jpeg,
-    Hdr,
-    Exr,
-}
-
-fn sniff(path: &Path, bytes: &[u8]) -> Result<Format> {
-    let known: [(&[u8], Format); 5] = [
-        (PNG_MAGIC, Format::Png),
-        (b"\xff\xd8\xff", Format::Jpeg),
-        (b"#?RADIANCE", Format::Hdr),
-        (b"#?RGBE", Format::Hdr),
-        (b"\x76\x2f\x31\x01", Format::Exr),
-    ];
-    known.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|&(_, format)| format).ok_or_else(|| {
-        let what = if bytes.is_empty() { "the file is empty" } else { "not a picture of a known format" };
-        Error::content(path, format!("{what}; known: PNG, JPEG, Radiance HDR, EXR"))
-    })
 }
 
 /// Refuses sizes that are zero, above the caps, or more than `len` bytes can hold when the best the format can
@@ -269,17 +257,11 @@ fn texels8(picture: DynamicImage, encoding: Encoding) -> Texels {
             })
         }
     };
-    match encoding {
-        Encoding::Srgb => Texels::Srgb8(quads),
-        Encoding::Linear => Texels::Linear8(quads),
-    }
+    eight_bits(quads, encoding)
 }
 
 fn texels16(picture: &DynamicImage, encoding: Encoding) -> Texels {
-    let curve: Vec<f32> = (0..=u16::MAX)
-        .map(|v| f32::from(v) / 65535.0)
-        .map(|v| if encoding == Encoding::Srgb { srgb_to_linear(v) } else { v })
-        .collect();
+    let curve = curve16(encoding);
     let value = |v: u16| curve[usize::from(v)];
     let texels = match picture {
         DynamicImage::ImageLuma16(i) => i.pixels().map(|p| [value(p.0[0]); 3]).collect(),

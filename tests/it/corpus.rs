@@ -91,6 +91,8 @@ fn target_of(path: &Path) -> Option<&'static str> {
         "jpg" | "jpeg" => "jpg",
         "hdr" => "hdr",
         "exr" => "exr",
+        "tif" | "tiff" => "tiff",
+        "pfm" => "pfm",
         "gz" => "gzip",
         "zst" => "zstd",
         _ => return None,

@@ -27,6 +27,8 @@ pub fn seeds() -> Vec<Seed> {
     meshes(&mut all);
     pictures(&mut all);
     hdr(&mut all);
+    tiff(&mut all);
+    pfm(&mut all);
     exr(&mut all);
     packed(&mut all);
     all
@@ -230,6 +232,68 @@ fn hdr(all: &mut Vec<Seed>) {
     let mut flat = b"#?RADIANCE\nEXPOSURE=2\nFORMAT=32-bit_rle_rgbe\n\n+Y 2 -X 3\n".to_vec();
     flat.extend([[1u8, 2, 3, 128], [1, 1, 1, 2], [4, 5, 6, 130], [7, 8, 9, 120], [1, 1, 1, 1]].concat());
     add(all, "hdr", "old-runs", flat);
+}
+
+fn tiff(all: &mut Vec<Seed>) {
+    use ::tiff::encoder::{Compression, DeflateLevel, Predictor, TiffEncoder, colortype::*};
+    let forms = [
+        ("plain", Compression::Uncompressed, Predictor::None),
+        ("deflate", Compression::Deflate(DeflateLevel::Best), Predictor::Horizontal),
+        ("lzw", Compression::Lzw, Predictor::None),
+        ("packbits", Compression::Packbits, Predictor::None),
+    ];
+    let [w, h] = SIDES;
+    let values: Vec<u16> = (0..4 * w * h).map(|i| (i * 771 % 65536) as u16).collect();
+    let floats: Vec<f32> = values.iter().map(|&v| f32::from(v) / 8.0).collect();
+    let bytes: Vec<u8> = values.iter().map(|&v| (v >> 8) as u8).collect();
+    for (name, compression, predictor) in forms {
+        let mut all_kinds = [(); 4].map(|()| Cursor::new(Vec::new()));
+        let begin = |out| {
+            let encoder = TiffEncoder::new(out).expect("begins");
+            encoder.with_compression(compression).with_predictor(predictor)
+        };
+        let pixels = (w * h) as usize;
+        let [gray, rgb, deep, float] = &mut all_kinds;
+        begin(gray).write_image::<Gray8>(w, h, &bytes[..pixels]).expect("memory takes it");
+        begin(rgb).write_image::<RGB8>(w, h, &bytes[..3 * pixels]).expect("memory takes it");
+        begin(deep).write_image::<RGBA16>(w, h, &values).expect("memory takes it");
+        let mut kinds = vec!["gray", "rgb", "rgba16"];
+        // Differences of floats have a predictor of their own.
+        if predictor == Predictor::None {
+            begin(float).write_image::<RGB32Float>(w, h, &floats[..3 * pixels]).expect("memory takes it");
+            kinds.push("float");
+        }
+        for (kind, bytes) in kinds.into_iter().zip(all_kinds) {
+            add(all, "tiff", &format!("{name}-{kind}"), bytes.into_inner());
+        }
+    }
+    let mut big = b"MM\0*\0\0\0\x08\0\x06".to_vec();
+    // Tags of TIFF 6.0, section 3: size, bits, no compression, black is 0, one strip of four bytes behind.
+    let tags = [
+        [256, 3, 1, 2 << 16],
+        [257, 3, 1, 2 << 16],
+        [258, 3, 1, 8 << 16],
+        [262, 3, 1, 1 << 16],
+        [273, 4, 1, 86],
+    ];
+    for [tag, kind, count, value] in tags.into_iter().chain([[279, 4, 1, 4]]) {
+        big.extend([(tag as u16).to_be_bytes(), (kind as u16).to_be_bytes()].concat());
+        big.extend([(count as u32).to_be_bytes(), (value as u32).to_be_bytes()].concat());
+    }
+    big.extend([0, 0, 0, 0, 1, 2, 3, 4]);
+    add(all, "tiff", "big-endian", big);
+}
+
+fn pfm(all: &mut Vec<Seed>) {
+    for (name, kind, channels) in [("gray", "Pf", 1), ("colour", "PF", 3), ("alpha", "PF4", 4)] {
+        for (order, scale) in [("little", "-1.0"), ("big", "1")] {
+            let mut bytes = format!("{kind}\n3 2\n{scale}\n").into_bytes();
+            for value in (0..6 * channels).map(|i| i as f32 / 4.0) {
+                bytes.extend(if order == "big" { value.to_be_bytes() } else { value.to_le_bytes() });
+            }
+            add(all, "pfm", &format!("{name}-{order}"), bytes);
+        }
+    }
 }
 
 fn exr(all: &mut Vec<Seed>) {

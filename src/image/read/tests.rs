@@ -1,6 +1,6 @@
 use super::*;
 use crate::base::image_data::Texels;
-use crate::color::Rgb;
+use crate::color::{Rgb, srgb_to_linear};
 use crate::testing::data_dir;
 use image::{GrayImage, ImageBuffer, Luma, Rgba, RgbaImage};
 use std::path::PathBuf;
@@ -147,7 +147,7 @@ fn hdr_row_codings_and_orientations() {
 fn what_is_no_picture_is_refused_with_the_known_formats() {
     for bytes in [&b""[..], b"hello", b"<svg>"] {
         let message = decode(bytes).unwrap_err().to_string();
-        assert!(message.contains("PNG, JPEG, Radiance HDR, EXR"), "{message}");
+        assert!(message.contains("PNG, JPEG, Radiance HDR, EXR, TIFF, PFM"), "{message}");
     }
     let missing = read_image(&temp().path().join("none.png"), None).unwrap_err();
     assert_eq!(missing.exit_code(), 3);
