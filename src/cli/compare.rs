@@ -75,7 +75,7 @@ struct ChoiceArgs {
     /// Added to the reference's square by relative errors [default: 0.01 of its squared mean]
     #[arg(long, value_name = "X", value_parser = |s: &str| number_in(s, 1e-30..=1e30))]
     epsilon: Option<f64>,
-    /// The largest possible value, of PSNR and SSIM [default: 1 on a display, else the reference's largest]
+    /// The largest possible value, of PSNR and SSIM [default: 1 of colours, else the reference's largest]
     #[arg(long, value_name = "X", value_parser = |s: &str| number_in(s, 1e-30..=1e30))]
     peak: Option<f64>,
     /// Pixels in a degree of the viewer's field, of FLIP [default: 67.02, a 4K display of 0.7 m from 0.7 m]

@@ -5,6 +5,9 @@ use super::metrics::{self, Metric};
 use crate::report::table::{Align, Cell, Column, Table};
 use std::fmt::Write;
 
+/// Where the worst thousandth of the pixels has at least this share of the relative squared error, it is said.
+const MADE_BY_FEW: f64 = 0.5;
+
 /// Five digits that count, without an exponent where that is easy to read.
 pub fn digits(v: f64) -> String {
     let size = v.abs();
@@ -83,6 +86,12 @@ pub fn remarks(c: &Comparison) -> Vec<String> {
     all.extend(c.notes.iter().cloned());
     if c.identical {
         all.push("the pictures are equal, to the last bit of every value that counts".into());
+    }
+    if let [Some(whole), Some(trimmed)] = ["relmse", "relmse-trimmed"].map(|m| c.value(m)) {
+        let share = 1.0 - trimmed / whole;
+        if share >= MADE_BY_FEW {
+            all.push(format!("a thousandth of the pixels makes {:.1} % of relMSE", 100.0 * share));
+        }
     }
     if let Some(cause) = &c.cause {
         all.push(format!("likely cause: {} ({:.0} % of the difference)", cause.text, 100.0 * cause.explains));

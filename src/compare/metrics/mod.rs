@@ -82,8 +82,7 @@ pub struct Input<'a> {
 pub struct MetricOptions {
     /// Added to squares of the reference by relative measures; none is [`EPSILON`] times its squared mean luminance.
     pub epsilon: Option<f64>,
-    /// The value that PSNR and SSIM take for the largest possible; none is 1 for what displays show, else the
-    /// reference's largest.
+    /// The value that PSNR and SSIM take for the largest possible; none is 1 for colours, else the reference's largest.
     pub peak: Option<f64>,
     /// Pixels that one degree of the viewer's field holds, for FLIP.
     pub pixels_per_degree: f32,
@@ -133,8 +132,11 @@ impl<'a> Input<'a> {
         if let Some(p) = self.options.peak {
             return (p, format!("peak {p}"));
         }
-        if self.pair.space == Space::Display {
-            return (1.0, "peak 1, on encoded values".into());
+        match self.pair.space {
+            Space::Display => return (1.0, "peak 1, on encoded values".into()),
+            // The largest value would be that of the one pixel that met the sun.
+            Space::Linear if self.pair.is_color => return (1.0, "peak 1, a display's white".into()),
+            Space::Linear => {}
         }
         let values = self.pair.reference.iter().flatten();
         let largest = f64::from(values.fold(0f32, |a, v| a.max(v.abs())));

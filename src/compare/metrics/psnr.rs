@@ -6,9 +6,8 @@ use super::{Better, Metric, Outcome, pointwise};
 pub const METRIC: Metric = Metric {
     name: "psnr",
     title: "PSNR",
-    doc: "10 log10(peak^2 / MSE): the RMSE as a ratio to the largest value, in decibels. 20 dB are a tenth, 40 dB a hundredth. Between \
-          8-bit pictures the peak is 255; of radiance it is the reference's largest value, which one bright pixel can decide: \
-          --peak sets it.",
+    doc: "10 log10(peak^2 / MSE): the RMSE as a ratio to the largest value, in decibels. 20 dB are a tenth, 40 dB a hundredth. The \
+          peak is 1: of 8-bit pictures 255, of radiance a display's white, so brighten or darken by --exposure first, or say --peak.",
     better: Better::Higher,
     unit: "dB",
     eval: |input| {

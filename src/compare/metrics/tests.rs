@@ -34,7 +34,7 @@ fn figures_of_a_few_pixels_by_hand() {
     near("relmse", (0.25 / 0.26 + 0.25 / 0.01 + 4.0 / 4.01) / 4.0);
     near("mape", 25.0 * (0.5 / 0.6 + 0.5 / 0.1 + 2.0 / 2.1));
     near("smape", 25.0 * (0.5 / 0.85 + 0.5 / 0.35 + 2.0 / 1.1));
-    near("psnr", 10.0 * (4.0f64 / (4.5 / 4.0)).log10());
+    near("psnr", 10.0 * (1.0f64 / (4.5 / 4.0)).log10());
     let fixed = MetricOptions { epsilon: Some(1.0), peak: Some(10.0), ..usual };
     assert!((value("relmse", &pair, &fixed) - (0.25 / 1.25 + 0.25 + 4.0 / 5.0) / 4.0).abs() < 1e-12);
     assert!((value("psnr", &pair, &fixed) - 10.0 * (100.0f64 / (4.5 / 4.0)).log10()).abs() < 1e-12);
