@@ -218,7 +218,7 @@ impl Options<'_> {
             pixels_per_degree: choices.ppd.map_or(PIXELS_PER_DEGREE, |p| p as f32),
             keep_space: space.is_some(),
         };
-        Ok(CompareOptions { pair, metrics: self.metrics.clone(), choices })
+        Ok(CompareOptions { pair, metrics: self.metrics.clone(), choices, maps: false })
     }
 }
 

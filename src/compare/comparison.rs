@@ -72,6 +72,8 @@ pub struct CompareOptions {
     pub metrics: Vec<&'static Metric>,
     /// Their choices.
     pub choices: MetricOptions,
+    /// Whether figures bring maps along.
+    pub maps: bool,
 }
 
 /// Compares two pictures; the pair comes along for maps and reports.
@@ -89,7 +91,7 @@ pub fn compare(reference: &Source, test: &Source, options: &CompareOptions) -> R
         notes
             .extend(invalid.describe().map(|what| format!("left out of all figures: {what} of the {which}")));
     }
-    let input = Input::new(&pair, &options.choices);
+    let input = Input { maps: options.maps, ..Input::new(&pair, &options.choices) };
     let figures = options.metrics.iter().map(|m| figure(m, &input)).collect();
     let comparison = Comparison {
         reference: reference.path.display().to_string(),

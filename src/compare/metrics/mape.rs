@@ -1,6 +1,6 @@
 //! Mean absolute relative error.
 
-use super::{Better, Metric, Outcome, pointwise};
+use super::{Better, Metric, pointwise};
 
 /// The row of the table.
 pub const METRIC: Metric = Metric {
@@ -13,6 +13,6 @@ pub const METRIC: Metric = Metric {
         let (epsilon, note) = input.epsilon();
         let floor = epsilon.sqrt();
         let error = move |r: f64, t: f64| 100.0 * (t - r).abs() / (r.abs() + floor);
-        Ok(Outcome { map: None, ..pointwise::outcome(input, note, error) })
+        Ok(pointwise::outcome(input, note, error))
     },
 };

@@ -74,7 +74,10 @@ pub struct Input<'a> {
     pub pair: &'a Pair,
     /// Choices.
     pub options: &'a MetricOptions,
+    /// Whether maps are wanted, which take time and memory.
+    pub maps: bool,
     level: OnceLock<f64>,
+    squares: OnceLock<Vec<f64>>,
 }
 
 /// Choices of the measures.
@@ -107,7 +110,12 @@ impl Default for MetricOptions {
 impl<'a> Input<'a> {
     /// For [`Metric::eval`].
     pub fn new(pair: &'a Pair, options: &'a MetricOptions) -> Self {
-        Input { pair, options, level: OnceLock::new() }
+        Input { pair, options, maps: false, level: OnceLock::new(), squares: OnceLock::new() }
+    }
+
+    /// Mean squared errors by channel.
+    pub fn squares(&self) -> &[f64] {
+        self.squares.get_or_init(|| pointwise::means(self.pair, |r, t| (t - r).powi(2)))
     }
 
     /// The reference's mean luminance.

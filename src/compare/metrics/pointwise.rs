@@ -60,5 +60,5 @@ pub fn map(pair: &Pair, error: impl Fn(f64, f64) -> f64 + Sync) -> Vec<f32> {
 pub fn outcome(input: &Input, note: String, error: impl Fn(f64, f64) -> f64 + Sync) -> Outcome {
     let channels = means(input.pair, &error);
     let value = channels.iter().sum::<f64>() / channels.len().max(1) as f64;
-    Outcome { value, channels, note, map: Some(map(input.pair, error)) }
+    Outcome { value, channels, note, map: input.maps.then(|| map(input.pair, error)) }
 }

@@ -1,6 +1,6 @@
 //! Peak signal-to-noise ratio.
 
-use super::{Better, Metric, Outcome, pointwise};
+use super::{Better, Metric, Outcome};
 
 /// The row of the table.
 pub const METRIC: Metric = Metric {
@@ -12,9 +12,9 @@ pub const METRIC: Metric = Metric {
     unit: "dB",
     eval: |input| {
         let (peak, note) = input.peak();
-        let squares = pointwise::means(input.pair, |r, t| (t - r).powi(2));
+        let squares = input.squares();
         let decibels = |mse: f64| if mse == 0.0 { f64::INFINITY } else { 10.0 * (peak * peak / mse).log10() };
         let value = decibels(squares.iter().sum::<f64>() / squares.len().max(1) as f64);
-        Ok(Outcome { value, channels: squares.into_iter().map(decibels).collect(), note, map: None })
+        Ok(Outcome { value, channels: squares.iter().copied().map(decibels).collect(), note, map: None })
     },
 };

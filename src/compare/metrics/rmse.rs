@@ -1,6 +1,6 @@
 //! Root mean squared error.
 
-use super::{Better, Metric, Outcome, pointwise};
+use super::{Better, Metric, Outcome};
 
 /// The row of the table.
 pub const METRIC: Metric = Metric {
@@ -10,8 +10,12 @@ pub const METRIC: Metric = Metric {
     better: Better::Lower,
     unit: "",
     eval: |input| {
-        let squares = pointwise::means(input.pair, |r, t| (t - r).powi(2));
+        let squares = input.squares();
         let value = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
-        Ok(Outcome { value, channels: squares.into_iter().map(f64::sqrt).collect(), ..Outcome::default() })
+        Ok(Outcome {
+            value,
+            channels: squares.iter().copied().map(f64::sqrt).collect(),
+            ..Outcome::default()
+        })
     },
 };

@@ -66,7 +66,9 @@ fn channels_are_told_apart_and_their_mean_is_the_figure() {
     let test: Planes = vec![vec![1.5; 16], vec![0.25; 16], zero];
     let names = ["R", "G", "B"].map(String::from).to_vec();
     let pair = Pair::new([4, 4], names, Space::Linear, [reference, test], None);
-    let outcome = (named("bias").unwrap().eval)(&Input::new(&pair, &MetricOptions::default())).unwrap();
+    let options = MetricOptions::default();
+    let input = Input { maps: true, ..Input::new(&pair, &options) };
+    let outcome = (named("bias").unwrap().eval)(&input).unwrap();
     assert_eq!((outcome.channels, outcome.value), (vec![0.5, 0.25, 0.0], 0.25));
     assert_eq!(outcome.map.unwrap(), vec![0.25; 16]);
 }
