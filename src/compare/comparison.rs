@@ -91,7 +91,7 @@ pub fn compare(reference: &Source, test: &Source, options: &CompareOptions) -> R
         notes
             .extend(invalid.describe().map(|what| format!("left out of all figures: {what} of the {which}")));
     }
-    let input = Input { maps: options.maps, ..Input::new(&pair, &options.choices) };
+    let input = Input::new(&pair, &options.choices).with_maps(options.maps);
     let figures = options.metrics.iter().map(|m| figure(m, &input)).collect();
     let comparison = Comparison {
         reference: reference.path.display().to_string(),

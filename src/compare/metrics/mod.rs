@@ -75,7 +75,7 @@ pub struct Input<'a> {
     /// Choices.
     pub options: &'a MetricOptions,
     /// Whether maps are wanted, which take time and memory.
-    pub maps: bool,
+    maps: bool,
     level: OnceLock<f64>,
     squares: OnceLock<Vec<f64>>,
 }
@@ -111,6 +111,11 @@ impl<'a> Input<'a> {
     /// For [`Metric::eval`].
     pub fn new(pair: &'a Pair, options: &'a MetricOptions) -> Self {
         Input { pair, options, maps: false, level: OnceLock::new(), squares: OnceLock::new() }
+    }
+
+    /// With maps, or without.
+    pub fn with_maps(self, maps: bool) -> Self {
+        Input { maps, ..self }
     }
 
     /// Mean squared errors by channel.

@@ -67,7 +67,7 @@ fn channels_are_told_apart_and_their_mean_is_the_figure() {
     let names = ["R", "G", "B"].map(String::from).to_vec();
     let pair = Pair::new([4, 4], names, Space::Linear, [reference, test], None);
     let options = MetricOptions::default();
-    let input = Input { maps: true, ..Input::new(&pair, &options) };
+    let input = Input::new(&pair, &options).with_maps(true);
     let outcome = (named("bias").unwrap().eval)(&input).unwrap();
     assert_eq!((outcome.channels, outcome.value), (vec![0.5, 0.25, 0.0], 0.25));
     assert_eq!(outcome.map.unwrap(), vec![0.25; 16]);
