@@ -47,6 +47,8 @@ pub struct Pair {
     pub counted: Option<Vec<bool>>,
     /// Luminance, or the only channel, or the mean of all; made when first asked for.
     gray: [OnceLock<Vec<f32>>; 2],
+    /// Encoded for a display; made when first asked for.
+    display: [OnceLock<Planes>; 2],
 }
 
 /// Which of the two.
@@ -72,8 +74,8 @@ impl Pair {
     ) -> Self {
         debug_assert!(reference.iter().chain(&test).all(|p| p.len() == size[0] * size[1]));
         let is_color = channels == ["R", "G", "B"] || channels == ["Y"];
-        let gray = Default::default();
-        Pair { size, origin: [0; 2], channels, space, is_color, reference, test, counted, gray }
+        let (gray, display) = Default::default();
+        Pair { size, origin: [0; 2], channels, space, is_color, reference, test, counted, gray, display }
     }
 
     /// Pixels, whether they count or not.
@@ -120,23 +122,36 @@ impl Pair {
         })
     }
 
-    /// Colours as a display shows them: sRGB-encoded, clipped to 0..1. None where channels are no colours.
-    pub fn display(&self, side: Side) -> Option<Vec<[f32; 3]>> {
-        self.colors(side, if self.space == Space::Linear { linear_to_srgb } else { |v| v })
-    }
-
-    /// Colours as radiance. None where channels are no colours.
-    pub fn linear(&self, side: Side) -> Option<Vec<[f32; 3]>> {
-        self.colors(side, if self.space == Space::Display { srgb_to_linear } else { |v| v })
-    }
-
-    fn colors(&self, side: Side, curve: fn(f32) -> f32) -> Option<Vec<[f32; 3]>> {
-        if !self.is_color {
-            return None;
+    /// Colours as a display shows them: sRGB-encoded, clipped to 0..1; made when first asked for. What is no colour stays as
+    /// it is.
+    pub fn display_planes(&self, side: Side) -> &Planes {
+        if !self.is_color || self.space == Space::Display {
+            return self.planes(side);
         }
-        let planes = self.planes(side);
-        let [r, g, b] = [0, 1, 2].map(|c| &planes[c.min(planes.len() - 1)]);
-        let pixels = (0..self.pixels()).into_par_iter().with_min_len(CHUNK);
-        Some(pixels.map(|i| [r[i], g[i], b[i]].map(curve)).collect())
+        self.display[side as usize].get_or_init(|| curved(self.planes(side), linear_to_srgb))
     }
+
+    /// Colours as a display shows them, pixel by pixel. None where channels are no colours.
+    pub fn display(&self, side: Side) -> Option<Vec<[f32; 3]>> {
+        self.is_color.then(|| self.pixels_of(self.display_planes(side)))
+    }
+
+    /// Colours as radiance, pixel by pixel. None where channels are no colours.
+    pub fn linear(&self, side: Side) -> Option<Vec<[f32; 3]>> {
+        match self.space {
+            _ if !self.is_color => None,
+            Space::Linear => Some(self.pixels_of(self.planes(side))),
+            Space::Display => Some(self.pixels_of(&curved(self.planes(side), srgb_to_linear))),
+        }
+    }
+
+    fn pixels_of(&self, planes: &Planes) -> Vec<[f32; 3]> {
+        let [r, g, b] = [0, 1, 2].map(|c| &planes[c.min(planes.len() - 1)]);
+        (0..self.pixels()).into_par_iter().with_min_len(CHUNK).map(|i| [r[i], g[i], b[i]]).collect()
+    }
+}
+
+fn curved(planes: &Planes, curve: fn(f32) -> f32) -> Planes {
+    let plane = |p: &Vec<f32>| p.par_iter().with_min_len(CHUNK).map(|v| curve(*v)).collect();
+    planes.iter().map(plane).collect()
 }
