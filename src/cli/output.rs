@@ -53,6 +53,8 @@ pub struct OutputPlan {
     pub denoises: bool,
     /// Whether the picture must know its own error.
     pub moments: bool,
+    /// Whether pixels must have points of their own.
+    pub independent: bool,
     look: Look,
 }
 
@@ -73,6 +75,7 @@ impl OutputArgs {
         Ok(OutputPlan {
             denoises: self.denoise,
             moments: self.denoise || film_layers.iter().any(|f| f.needs_moments),
+            independent: film_layers.iter().any(|f| f.needs_independence),
             aovs,
             written,
             film_layers,

@@ -60,7 +60,7 @@ struct SamplingArgs {
     /// Longest path in surfaces, the camera's first hit counted
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     max_depth: Option<u32>,
-    /// Point set [default: zsobol, which is the same as owen-sobol where samples are dealt by need, with --time or a target]
+    /// Point set [default: zsobol, which is the same as owen-sobol where samples are dealt by need, with --time, a target or --aov halves]
     #[arg(long, value_name = "NAME")]
     sampler: Option<String>,
     /// Pixel filter [default: blackman-harris]
@@ -76,7 +76,7 @@ struct SamplingArgs {
     outlines: Option<u32>,
     /// Which pixels the samples go to: those that need them, for what --spp samples of each would cost, as far as their need
     /// can be foretold (by-guess: as if that were certain), or all as many
-    /// [default: by-need; even below 4 samples, and where --time, a target, --denoise or --aov variance take two sets of points]
+    /// [default: by-need; even below 4 samples, and where --time, a target, --denoise, --aov variance or --aov halves take two sets of points]
     #[arg(long, value_name = "by-need|by-guess|even")]
     dealing: Option<Dealing>,
     /// Seed of every random choice [default: 0]
@@ -226,7 +226,10 @@ impl SamplingArgs {
             target: plan.target.map(|t| t.target),
             time: self.time,
             seed: self.seed.unwrap_or(usual.seed),
-            sampler: plan.sampler.unwrap_or(usual.sampler),
+            sampler: match plan.sampler.unwrap_or(usual.sampler) {
+                Sampler::ZSobol if plan.output.independent => Sampler::OwenSobol,
+                sampler => sampler,
+            },
             filter: plan.filter.unwrap_or(usual.filter),
             skip_background: self.sky_pixels != Some(SkyPixels::Sample),
             outlines: self.outlines,
