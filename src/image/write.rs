@@ -46,7 +46,8 @@ const ENDINGS: [(&str, Format); 8] = [
     ("tif", Format::Tiff),
 ];
 
-const KNOWN: &str = "png, jpg, exr, hdr, pfm, tiff";
+/// What is written, as messages list it.
+pub const KNOWN: &str = "png, jpg, exr, hdr, pfm, tiff";
 
 /// Finds out, without leaving a trace, whether a picture could be written there: before a render, not after.
 ///
@@ -83,6 +84,20 @@ pub fn write_file(path: &Path, content: &[u8]) -> Result<()> {
 /// Whether a path ends as pictures do that are written.
 pub fn is_picture(path: &Path) -> bool {
     format_of(path).is_ok()
+}
+
+/// Whether a picture of this name and so many bits a sample holds radiance, so that no look is applied.
+///
+/// # Errors
+/// An unknown extension; bits that the format does not have.
+pub fn holds_radiance(path: &Path, bits: Option<u32>) -> Result<bool> {
+    let format = format_of(path)?;
+    check_bits(path, format, bits)?;
+    Ok(match format {
+        Format::Exr | Format::Hdr | Format::Pfm => true,
+        Format::Tiff => bits.is_none_or(|b| b == 32),
+        Format::Png | Format::Jpeg => false,
+    })
 }
 
 /// Writes a picture; the extension of `path` says in which format. A file that stands there is replaced.

@@ -3,6 +3,7 @@
 mod bad_input;
 mod bench;
 mod bench_error;
+mod convert;
 mod crosscheck;
 mod denoise;
 mod folder;
