@@ -89,7 +89,7 @@ enum Verb {
     Crosscheck(Box<crosscheck::CrosscheckArgs>),
     /// Certify that rays neither leak, nor meet what they left, nor jump over what is near, on every kernel
     Check(Box<check::CheckArgs>),
-    /// Write a scene of another program as a native one
+    /// Write scenes of other programs as native ones, pictures as others, skies in other layouts
     Convert(convert::ConvertArgs),
     /// List every registered kind with its parameters
     List(list::ListArgs),

@@ -105,7 +105,8 @@ impl OutputArgs {
         let shown = shows_one.then(|| denoise::shown(&picture));
         let transfer = self.transfer.map_or(info.transfer, |TransferArg(t)| t);
         let look = Look { transfer, ..plan.look };
-        let options = WriteOptions { look, alpha: info.background == Background::Transparent };
+        let alpha = info.background == Background::Transparent;
+        let options = WriteOptions { look, alpha, ..WriteOptions::default() };
         self.outputs.iter().try_for_each(|path| {
             let picture = shown.as_ref().filter(|_| !has_layers(path)).unwrap_or(&picture);
             write_picture(path, picture, &options)?;

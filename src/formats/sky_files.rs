@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 /// Endings of files that count as pictures in a folder.
-const ENDINGS: [&str; 5] = ["png", "jpg", "jpeg", "hdr", "exr"];
+pub(crate) const ENDINGS: [&str; 8] = ["png", "jpg", "jpeg", "hdr", "exr", "tif", "tiff", "pfm"];
 
 /// Names of faces in messages, in their order.
 const FACES: [&str; 6] = ["+X", "-X", "+Y", "-Y", "+Z", "-Z"];

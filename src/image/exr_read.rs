@@ -78,6 +78,37 @@ pub(super) fn decode_planes(path: &Path, bytes: &[u8]) -> Result<Picture> {
     decode_channels(path, bytes, reader, 0, &channels)
 }
 
+/// Every channel of every part, by full names.
+pub(super) fn decode_whole(path: &Path, bytes: &[u8]) -> Result<Picture> {
+    let headers = open(path, bytes)?.headers().to_vec();
+    let layers = exr_layers::layers(&headers);
+    let mut whole: Option<Picture> = None;
+    for part in 0..headers.len() {
+        let channels: Vec<_> = layers
+            .iter()
+            .filter(|layer| layer.part == part)
+            .flat_map(|layer| {
+                let full = |bare: &str| match layer.name.is_empty() {
+                    true => bare.to_owned(),
+                    false => format!("{}.{bare}", layer.name),
+                };
+                layer.channels.iter().map(move |(bare, at)| (full(bare), *at))
+            })
+            .collect();
+        let picture = decode_channels(path, bytes, open(path, bytes)?, part, &channels)?;
+        let Some(whole) = &mut whole else {
+            whole = Some(picture);
+            continue;
+        };
+        let window = |p: &Picture| (p.width, p.height, p.origin, p.frame);
+        if window(whole) != window(&picture) {
+            return Err(Error::content(path, "its parts have different windows: choose one layer"));
+        }
+        whole.planes.extend(picture.planes);
+    }
+    whole.ok_or_else(|| damaged(path, "it has no parts"))
+}
+
 /// Channels of one part, each by the name that is given with its index.
 fn decode_channels(
     path: &Path,
@@ -125,23 +156,30 @@ impl Picture {
             let shown = if axis == 0 { display.size.x() } else { display.size.y() };
             self.frame[axis] = shown.max(self.origin[axis] + size[axis]);
         }
-        let mut keep = |key: &str, text: &Text| {
-            // Written as UTF-8 by this program and most others; the library would take the bytes for Latin 1.
-            self.metadata.push((key.to_owned(), String::from_utf8_lossy(text.as_slice()).into_owned()));
-        };
-        let own = &header.own_attributes;
-        let known = [("software", &own.software_name), ("comments", &own.comments), ("owner", &own.owner)];
-        known.iter().for_each(|(key, text)| text.iter().for_each(|text| keep(key, text)));
-        for (key, value) in own.other.iter().chain(&header.shared_attributes.other) {
-            if let AttributeValue::Text(text) = value {
-                keep(&key.to_string(), text);
-            }
-        }
-        self.metadata.sort();
+        self.metadata = texts(header);
     }
 }
 
-fn open<'a>(path: &Path, bytes: &'a [u8]) -> Result<Reader<Cursor<&'a [u8]>>> {
+/// Key and value of all text attributes, sorted.
+pub(super) fn texts(header: &Header) -> Vec<(String, String)> {
+    let mut all = Vec::new();
+    let mut keep = |key: &str, text: &Text| {
+        // Written as UTF-8 by this program and most others; the library would take the bytes for Latin 1.
+        all.push((key.to_owned(), String::from_utf8_lossy(text.as_slice()).into_owned()));
+    };
+    let own = &header.own_attributes;
+    let known = [("software", &own.software_name), ("comments", &own.comments), ("owner", &own.owner)];
+    known.iter().for_each(|(key, text)| text.iter().for_each(|text| keep(key, text)));
+    for (key, value) in own.other.iter().chain(&header.shared_attributes.other) {
+        if let AttributeValue::Text(text) = value {
+            keep(&key.to_string(), text);
+        }
+    }
+    all.sort();
+    all
+}
+
+pub(super) fn open<'a>(path: &Path, bytes: &'a [u8]) -> Result<Reader<Cursor<&'a [u8]>>> {
     exr::block::read(Cursor::new(bytes), false).map_err(|e| damaged(path, e))
 }
 

@@ -14,6 +14,20 @@ pub(super) enum Kind {
     Pfm,
 }
 
+impl Kind {
+    /// As messages have it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Png => "PNG",
+            Kind::Jpeg => "JPEG",
+            Kind::Hdr => "Radiance HDR",
+            Kind::Exr => "EXR",
+            Kind::Tiff => "TIFF",
+            Kind::Pfm => "PFM",
+        }
+    }
+}
+
 /// Bytes that tell every kind.
 pub(super) const LONGEST_MAGIC: u64 = 10;
 

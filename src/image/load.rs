@@ -6,6 +6,7 @@ use super::picture::Picture;
 use super::read::{decode_raw, guarded, read_bytes};
 use super::{exr_read, hdr, pfm, tiff_read};
 use crate::base::image_data::Encoding;
+use crate::color::srgb_to_linear;
 use crate::error::{Error, Result};
 use image::ImageFormat;
 use std::path::Path;
@@ -45,6 +46,36 @@ pub struct Loaded {
     pub layer: String,
     /// Every layer of the file with its channels.
     pub layers: Vec<(String, Vec<String>)>,
+}
+
+impl Loaded {
+    /// The picture in linear values: whole numbers decoded as their encoding says, colour multiplied by alpha.
+    pub fn into_linear(self) -> Picture {
+        let mut picture = self.picture;
+        let Stored::Integer { encoding, .. } = self.stored else { return picture };
+        let alpha = picture.plane("A").map(|p| p.data.clone());
+        for plane in picture.planes.iter_mut().filter(|p| p.name != "A") {
+            if encoding == Encoding::Srgb {
+                plane.data.iter_mut().for_each(|v| *v = srgb_to_linear(*v));
+            }
+            if let Some(alpha) = &alpha {
+                plane.data.iter_mut().zip(alpha).for_each(|(v, a)| *v *= a);
+            }
+        }
+        picture
+    }
+}
+
+/// Every channel of every part of an EXR file, by full names; of other files, what [`Loaded::into_linear`] gives.
+///
+/// # Errors
+/// As [`load`]; parts that do not lie in one window.
+pub fn load_whole(path: &Path, encoding: Option<Encoding>) -> Result<Picture> {
+    let bytes = read_bytes(path)?;
+    if sniff(path, &bytes)? == Kind::Exr {
+        return guarded(path, || exr_read::decode_whole(path, &bytes));
+    }
+    decode(path, &bytes, &LoadOptions { encoding, ..LoadOptions::default() }).map(Loaded::into_linear)
 }
 
 /// Reads a picture. Alpha is kept where there is one: multiplied into the colour in EXR, beside it in whole numbers.

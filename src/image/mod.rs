@@ -1,10 +1,13 @@
 //! L4: pictures in and out.
 
+pub mod about;
 mod deflate;
 pub mod denoise;
+pub mod environment;
 mod exr_layers;
 mod exr_read;
 mod exr_write;
+pub mod false_color;
 mod hdr;
 mod kind;
 pub mod load;

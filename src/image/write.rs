@@ -1,23 +1,27 @@
-//! Writes pictures to EXR, PNG and JPEG, whole or not at all: into a temporary file of the same folder, flushed to
-//! the disk, then renamed.
+//! Writes pictures to EXR, PNG, JPEG, Radiance HDR, PFM and TIFF, whole or not at all: into a temporary file of the
+//! same folder, flushed to the disk, then renamed.
 
+mod radiance;
+mod shown;
+
+use super::exr_write;
 use super::picture::Picture;
 use super::tonemap::Look;
-use super::{exr_write, srgb8};
-use crate::color::{Rgb, Transfer};
 use crate::error::{Error, Result};
-use rayon::prelude::*;
-use std::fs::{File, OpenOptions};
-use std::io::{self, BufWriter, Write};
+use std::fs::OpenOptions;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// What a display format needs to know; EXR holds radiance and ignores it.
+/// What a display format needs to know; EXR, HDR, PFM and TIFF of floats hold radiance and ignore the look.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct WriteOptions {
     /// Exposure and tone operator.
     pub look: Look,
-    /// Whether PNG gets the plane `A`. Without it the picture stands on black.
+    /// Whether PNG, PFM and TIFF get the plane `A`. Without it the picture stands on black.
     pub alpha: bool,
+    /// Bits a sample where a format has a choice: 8 or 16 of PNG, 8, 16 or 32 (floats) of TIFF. What is usual (8, and 32
+    /// of TIFF) where it is not said.
+    pub bits: Option<u32>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,15 +29,30 @@ enum Format {
     Png,
     Jpeg,
     Exr,
+    Hdr,
+    Pfm,
+    Tiff,
 }
 
-/// JPEG quality: no visible loss, about a sixth of the PNG.
-const JPEG_QUALITY: u8 = 92;
+/// Endings of picture files that are written; the first of each format is the usual one.
+const ENDINGS: [(&str, Format); 8] = [
+    ("png", Format::Png),
+    ("jpg", Format::Jpeg),
+    ("jpeg", Format::Jpeg),
+    ("exr", Format::Exr),
+    ("hdr", Format::Hdr),
+    ("pfm", Format::Pfm),
+    ("tiff", Format::Tiff),
+    ("tif", Format::Tiff),
+];
+
+/// What is written, as messages list it.
+pub const KNOWN: &str = "png, jpg, exr, hdr, pfm, tiff";
 
 /// Finds out, without leaving a trace, whether a picture could be written there: before a render, not after.
 ///
 /// # Errors
-/// An extension other than png, jpg, jpeg or exr; a folder that does not exist or cannot be written to; a folder, a
+/// An unknown extension; a folder that does not exist or cannot be written to; a folder, a
 /// device or a write-protected file in the place of the picture.
 pub fn check_writable(path: &Path) -> Result<()> {
     format_of(path)?;
@@ -62,43 +81,112 @@ pub fn write_file(path: &Path, content: &[u8]) -> Result<()> {
     Ok(())
 }
 
+/// Whether a path ends as pictures do that are written.
+pub fn is_picture(path: &Path) -> bool {
+    format_of(path).is_ok()
+}
+
+/// Whether a picture of this name and so many bits a sample holds radiance, so that no look is applied.
+///
+/// # Errors
+/// An unknown extension; bits that the format does not have.
+pub fn holds_radiance(path: &Path, bits: Option<u32>) -> Result<bool> {
+    let format = format_of(path)?;
+    check_bits(path, format, bits)?;
+    Ok(match format {
+        Format::Exr | Format::Hdr | Format::Pfm => true,
+        Format::Tiff => bits.is_none_or(|b| b == 32),
+        Format::Png | Format::Jpeg => false,
+    })
+}
+
 /// Writes a picture; the extension of `path` says in which format. A file that stands there is replaced.
 ///
 /// - `exr`: all planes, half or float as each says, ZIP compression, metadata as string attributes.
-/// - `png`: `R G B` (or `Y` as gray values), 8 bits through the look and its curve, metadata as text; with
+/// - `png`: `R G B` (or `Y` as gray values), 8 or 16 bits through the look and its curve, metadata as text; with
 ///   [`WriteOptions::alpha`] also `A`, and the colour divided by it, as the format has it.
 /// - `jpg`: as `png`, without alpha and metadata.
+/// - `hdr`: `R G B` (or `Y`) as mantissas of 8 bits with a shared exponent, metadata as comments.
+/// - `pfm`: `R G B` or `Y` as 32-bit floats; with [`WriteOptions::alpha`] also `A`.
+/// - `tiff`: as `pfm`, or of 8 or 16 bits as `png`; without metadata.
+///
+/// Values that a format cannot hold are counted in one warning.
 ///
 /// # Errors
-/// As [`check_writable`]; a disk that is full; for display formats, a picture without `R G B` or `Y`.
+/// As [`check_writable`]; a disk that is full; bits that the format does not have; but for EXR, a picture without
+/// `R G B` or `Y`.
 pub fn write_picture(path: &Path, picture: &Picture, options: &WriteOptions) -> Result<()> {
     let format = format_of(path)?;
+    check_bits(path, format, options.bits)?;
     check_picture(picture)?;
     let target = target_of(path)?;
     let mut file = temporary(path, &target)?;
     let fail = |e: io::Error| Error::file(path, "write", e);
     let out = file.as_file_mut();
-    match format {
-        Format::Exr => write_exr(path, out, picture).map_err(fail)?,
-        Format::Png => write_png(out, picture, options).map_err(fail)?,
-        Format::Jpeg => write_jpeg(out, picture, options).map_err(fail)?,
+    let (lost, what) = match format {
+        // Unbuffered: blocks are large, and everything else is one write.
+        Format::Exr => {
+            (exr_write::write(out, picture), "values beyond the range of 16-bit floats became 65504")
+        }
+        Format::Png => (shown::write_png(out, picture, options), NO_NUMBERS),
+        Format::Jpeg => (shown::write_jpeg(out, picture, options), NO_NUMBERS),
+        Format::Tiff if options.bits.is_some_and(|b| b < 32) => {
+            (shown::write_tiff(out, picture, options), NO_NUMBERS)
+        }
+        Format::Tiff => (radiance::write_tiff(out, picture, options).map(|()| 0), ""),
+        Format::Pfm => (radiance::write_pfm(out, picture, options).map(|()| 0), ""),
+        Format::Hdr => (
+            radiance::write_hdr(out, picture),
+            "values that are negative, not finite or beyond 1.7e38 became 0 or the largest",
+        ),
+    };
+    let lost = lost.map_err(fail)?;
+    if lost > 0 {
+        log::warn!("{}: {lost} {what}", path.display());
     }
     out.sync_all().map_err(fail)?;
     file.persist(&target).map_err(|e| fail(e.error))?;
     Ok(())
 }
 
+const NO_NUMBERS: &str = "pixels had values that are no numbers, and are shown as 0";
+
 fn format_of(path: &Path) -> Result<Format> {
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    match extension.as_str() {
-        "png" => Ok(Format::Png),
-        "jpg" | "jpeg" => Ok(Format::Jpeg),
-        "exr" => Ok(Format::Exr),
-        "" => Err(Error::Usage(format!("{}: has no extension; known: png, jpg, exr", path.display()))),
-        _ => Err(Error::Usage(format!(
-            "{}: unknown extension \"{extension}\"; known: png, jpg, exr",
-            path.display()
-        ))),
+    if let Some((_, format)) = ENDINGS.iter().find(|(e, _)| *e == extension) {
+        return Ok(*format);
+    }
+    let path = path.display();
+    Err(Error::Usage(match extension.is_empty() {
+        true => format!("{path}: has no extension; known: {KNOWN}"),
+        false => format!("{path}: unknown extension \"{extension}\"; known: {KNOWN}"),
+    }))
+}
+
+fn check_bits(path: &Path, format: Format, bits: Option<u32>) -> Result<()> {
+    let (known, words): (&[u32], _) = match format {
+        Format::Png => (&[8, 16], "8 or 16"),
+        Format::Tiff => (&[8, 16, 32], "8, 16 or 32"),
+        Format::Jpeg | Format::Hdr => (&[8], "8"),
+        Format::Pfm => (&[32], "32"),
+        // As each plane says.
+        Format::Exr => (&[16, 32], "16 or 32"),
+    };
+    match bits.filter(|bits| !known.contains(bits)) {
+        None => Ok(()),
+        Some(bits) => {
+            let path = path.display();
+            Err(Error::Usage(format!("{path}: {bits} bits a sample are not possible there, but {words}")))
+        }
+    }
+}
+
+/// The planes `R G B`, or `Y` thrice.
+fn colour_planes(picture: &Picture) -> io::Result<[&[f32]; 3]> {
+    let plane = |name: &str| picture.plane(name).or_else(|| picture.plane("Y")).map(|p| &p.data[..]);
+    match (plane("R"), plane("G"), plane("B")) {
+        (Some(r), Some(g), Some(b)) => Ok([r, g, b]),
+        _ => Err(io::Error::new(io::ErrorKind::InvalidInput, "the picture has no planes R, G, B or Y")),
     }
 }
 
@@ -149,88 +237,6 @@ fn check_picture(picture: &Picture) -> Result<()> {
         )));
     }
     Ok(())
-}
-
-fn write_exr(path: &Path, out: &mut File, picture: &Picture) -> io::Result<()> {
-    // Unbuffered: blocks are large, and everything else is one write.
-    let clamped = exr_write::write(out, picture)?;
-    if clamped > 0 {
-        log::warn!("{}: {clamped} values beyond the range of 16-bit floats became 65504", path.display());
-    }
-    Ok(())
-}
-
-/// The byte nearest to the encoding of a linear value; NaN counts as 0.
-fn encoder(transfer: Transfer) -> impl Fn(f32) -> u8 {
-    move |v| match transfer {
-        Transfer::Srgb => srgb8::encode(v),
-        Transfer::Gamma(gamma) => {
-            // A cast from NaN gives 0.
-            (v.clamp(0.0, 1.0).powf(1.0 / gamma) * 255.0).round() as u8
-        }
-    }
-}
-
-/// Rows of 8-bit samples, `channels` (3 or 4) a pixel.
-fn to_bytes(picture: &Picture, look: &Look, channels: usize) -> io::Result<Vec<u8>> {
-    let plane = |name: &str| picture.plane(name).or_else(|| picture.plane("Y")).map(|p| &p.data);
-    let (Some(r), Some(g), Some(b)) = (plane("R"), plane("G"), plane("B")) else {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "the picture has no planes R, G, B or Y"));
-    };
-    let alpha = picture.plane("A").map(|p| &p.data).filter(|_| channels == 4);
-    let scale = look.exposure.exp2();
-    let encode = encoder(look.transfer);
-    let mut bytes = vec![0; picture.width * picture.height * channels];
-    bytes.par_chunks_mut(picture.width * channels).enumerate().for_each(|(y, row)| {
-        for (x, out) in row.chunks_exact_mut(channels).enumerate() {
-            let at = y * picture.width + x;
-            let a = alpha.map_or(1.0, |alpha| alpha[at].clamp(0.0, 1.0));
-            // The format wants colour not multiplied by alpha.
-            let factor = if a > 0.0 { scale / a } else { 0.0 };
-            let shown = look.tonemap.apply(Rgb::new(r[at], g[at], b[at]) * factor);
-            out[..3].copy_from_slice(&shown.to_array().map(&encode));
-            if let Some(last) = out.get_mut(3) {
-                *last = (a * 255.0).round() as u8;
-            }
-        }
-    });
-    Ok(bytes)
-}
-
-fn write_png(out: &mut File, picture: &Picture, options: &WriteOptions) -> io::Result<()> {
-    let channels = if options.alpha && picture.plane("A").is_some() { 4 } else { 3 };
-    let bytes = to_bytes(picture, &options.look, channels)?;
-    let mut file = BufWriter::with_capacity(1 << 18, out);
-    let mut encoder = png::Encoder::new(&mut file, picture.width as u32, picture.height as u32);
-    encoder.set_color(if channels == 4 { png::ColorType::Rgba } else { png::ColorType::Rgb });
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::Fast);
-    // Whoever asks for another curve wants the bytes that a program wrote which said nothing of its curve.
-    if options.look.transfer == Transfer::Srgb {
-        encoder.set_source_srgb(png::SrgbRenderingIntent::RelativeColorimetric);
-    }
-    for (key, value) in &picture.metadata {
-        // International text takes any value; only the keyword is restricted, to 79 Latin letters.
-        let keyword: String = key.chars().filter(|c| c.is_ascii_graphic() || *c == ' ').take(79).collect();
-        encoder.add_itxt_chunk(keyword, value.clone()).map_err(io::Error::other)?;
-    }
-    let mut writer = encoder.write_header().map_err(io::Error::other)?;
-    writer.write_image_data(&bytes).map_err(io::Error::other)?;
-    writer.finish().map_err(io::Error::other)?;
-    file.flush()
-}
-
-fn write_jpeg(out: &mut File, picture: &Picture, options: &WriteOptions) -> io::Result<()> {
-    let bytes = to_bytes(picture, &options.look, 3)?;
-    let (Ok(width), Ok(height)) = (u16::try_from(picture.width), u16::try_from(picture.height)) else {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "JPEG holds at most 65535 pixels a side"));
-    };
-    let mut file = BufWriter::with_capacity(1 << 18, out);
-    let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut file, JPEG_QUALITY);
-    encoder
-        .encode(&bytes, width.into(), height.into(), image::ExtendedColorType::Rgb8)
-        .map_err(io::Error::other)?;
-    file.flush()
 }
 
 #[cfg(test)]

@@ -74,7 +74,14 @@ pub struct Question {
 
 impl Default for Question {
     fn default() -> Self {
-        Question { alpha: 0.01, tile: 16, equivalent: None, masks: Vec::new(), design: None, names: Vec::new() }
+        Question {
+            alpha: 0.01,
+            tile: 16,
+            equivalent: None,
+            masks: Vec::new(),
+            design: None,
+            names: Vec::new(),
+        }
     }
 }
 
@@ -103,7 +110,8 @@ impl Share {
         if c.reference <= 0.0 {
             return None;
         }
-        let reach = if c.error > 0.0 { student_quantile((1.0 - CONFIDENCE) / 2.0, c.freedom) * c.error } else { 0.0 };
+        let reach =
+            if c.error > 0.0 { student_quantile((1.0 - CONFIDENCE) / 2.0, c.freedom) * c.error } else { 0.0 };
         let [value, low, high] = [0.0, -reach, reach].map(|off| (c.difference + off) / c.reference);
         Some(Share { value, low, high })
     }
@@ -298,7 +306,9 @@ pub fn compare(reference: &Replicates, test: &Replicates, question: &Question) -
 impl Question {
     fn check(&self, reference: &Replicates) -> Result<()> {
         if !(self.alpha > 0.0 && self.alpha <= 0.5) {
-            return Err(Error::Usage("the rate of false alarms (--alpha) lies above 0 and is at most 50 %".into()));
+            return Err(Error::Usage(
+                "the rate of false alarms (--alpha) lies above 0 and is at most 50 %".into(),
+            ));
         }
         if self.tile == 0 {
             return Err(Error::Usage("a tile has at least one pixel a side".into()));
@@ -334,11 +344,19 @@ impl Weights {
     }
 
     /// The families that have something to say, with their weights scaled to 1, and their combination.
-    fn verdict(&self, whole: &Region, tiles: &[Region], regions: &[Region]) -> (Vec<FamilyLine>, Option<f64>) {
+    fn verdict(
+        &self,
+        whole: &Region,
+        tiles: &[Region],
+        regions: &[Region],
+    ) -> (Vec<FamilyLine>, Option<f64>) {
         let of = |all: &[Region]| -> Vec<f64> { all.iter().filter_map(|r| r.p).collect() };
         let whole = std::slice::from_ref(whole);
-        let named =
-            [("whole", self.whole, of(whole)), ("tiles", self.tiles, of(tiles)), ("objects", self.regions, of(regions))];
+        let named = [
+            ("whole", self.whole, of(whole)),
+            ("tiles", self.tiles, of(tiles)),
+            ("objects", self.regions, of(regions)),
+        ];
         let mut lines: Vec<FamilyLine> = named
             .into_iter()
             .filter(|(_, weight, ps)| *weight > 0.0 && !ps.is_empty())
@@ -435,5 +453,6 @@ fn regions(pair: &Pair, question: &Question, weight: f64) -> Vec<Region> {
 fn is_identical(pair: &Pair) -> bool {
     let (a, b) = (pair.reference, pair.test);
     a.len() == b.len()
-        && (0..a.len()).all(|part| (0..pair.pixels()).all(|pixel| a.value(part, pixel) == b.value(part, pixel)))
+        && (0..a.len())
+            .all(|part| (0..pair.pixels()).all(|pixel| a.value(part, pixel) == b.value(part, pixel)))
 }

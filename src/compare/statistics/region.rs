@@ -254,7 +254,8 @@ fn is_still(items: &[Item], tolerance: &[f64; 3]) -> bool {
 
 fn first_sums(pair: &Pair, pixels: &[u32], pictures: [bool; 2]) -> Sums {
     let (mut sums, mut items) = (Sums::default(), Vec::new());
-    for (side, of) in [pair.reference, pair.test].into_iter().enumerate().filter(|(side, _)| pictures[*side]) {
+    for (side, of) in [pair.reference, pair.test].into_iter().enumerate().filter(|(side, _)| pictures[*side])
+    {
         sums.parts[side] = vec![[0.0; 3]; of.len()];
     }
     for &pixel in pixels {
@@ -321,12 +322,15 @@ fn picture_freedom(pair: &Pair, pictures: [bool; 2]) -> f64 {
 /// foretells: that of samples alike falls as 1 / n or faster. Its own estimate may have missed what is rare, and would then
 /// make the other's rare finds look significant.
 fn weights(pair: &Pair, sums: &Sums) -> ([f64; 2], bool) {
-    let known = [pair.reference, pair.test].map(|r| if r.spread == Spread::Pixels { r.samples() } else { None });
+    let known =
+        [pair.reference, pair.test].map(|r| if r.spread == Spread::Pixels { r.samples() } else { None });
     let (Design::Independent, [Some(m), Some(n)]) = (pair.design, known) else { return ([1.0; 2], false) };
     let variance = sums.covariance.map(|v| quadratic(&v, LUMINANCE));
     match n / m {
         ratio if ratio >= UNLIKE && ratio * variance[1] > MISSED * variance[0] => ([0.0, 1.0 + ratio], true),
-        ratio if ratio * UNLIKE <= 1.0 && variance[0] > MISSED * ratio * variance[1] => ([1.0 + 1.0 / ratio, 0.0], true),
+        ratio if ratio * UNLIKE <= 1.0 && variance[0] > MISSED * ratio * variance[1] => {
+            ([1.0 + 1.0 / ratio, 0.0], true)
+        }
         _ => ([1.0; 2], false),
     }
 }

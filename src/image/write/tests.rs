@@ -1,6 +1,7 @@
 use super::*;
 use crate::base::image_data::Texels;
-use crate::color::linear_to_srgb;
+use crate::color::{Rgb, linear_to_srgb, srgb_to_linear};
+use crate::image::load::{Loaded, Stored, load};
 use crate::image::picture::SampleKind;
 use crate::image::read::{read_image, read_planes};
 use crate::image::tonemap::ToneMap;
@@ -84,7 +85,7 @@ fn png_holds_the_look_through_the_srgb_curve() {
     let path = dir.path().join("x.PNG");
     let out = picture(40, 30);
     let look = Look { exposure: -1.0, tonemap: ToneMap::Reinhard, ..Look::default() };
-    write_picture(&path, &out, &WriteOptions { look, alpha: true }).expect("writes");
+    write_picture(&path, &out, &WriteOptions { look, alpha: true, bits: None }).expect("writes");
     let image = read_image(&path, None).expect("reads");
     let Texels::Srgb8(texels) = &image.texels else { panic!("8 bits") };
     let value = |name: &str, at: usize| out.plane(name).expect("there").data[at];
@@ -142,8 +143,8 @@ fn places_that_cannot_be_written_are_found_beforehand() {
     std::fs::write(at("file"), "x").expect("writes");
     std::fs::write(at("old.png"), "precious").expect("writes");
     for (path, code, part) in [
-        (at("x.bmp"), 2, "png, jpg, exr"),
-        (at("x"), 2, "png, jpg, exr"),
+        (at("x.bmp"), 2, "png, jpg, exr, hdr, pfm, tiff"),
+        (at("x"), 2, "png, jpg, exr, hdr, pfm, tiff"),
         (at("none/x.png"), 3, "does not exist"),
         (at("folder.png"), 3, "folder"),
         (at("file/x.png"), 3, "not a folder"),
@@ -189,4 +190,132 @@ fn links_are_followed_and_permissions_are_ordinary() {
     std::fs::write(&plain, "x").expect("writes");
     let mode = |path: &Path| path.metadata().expect("there").permissions().mode();
     assert_eq!(mode(&real), mode(&plain));
+}
+
+/// Colour of any magnitude that `HDR` holds, and runs of one colour.
+fn bright(width: usize, height: usize) -> Picture {
+    let mut rng = TestRng::new(5);
+    let mut picture = Picture::new(width, height);
+    for name in ["R", "G", "B"] {
+        let value = |i: usize| match i / 7 % 3 {
+            0 => 0.75,
+            1 => (rng.f32() * 200.0 - 100.0).exp2(),
+            _ => rng.f32(),
+        };
+        picture.push(name, SampleKind::Float, (0..width * height).map(value).collect());
+    }
+    picture
+}
+
+fn written(name: &str, picture: &Picture, options: &WriteOptions) -> (Vec<u8>, Loaded) {
+    let dir = tempfile::tempdir().expect("folder");
+    let path = dir.path().join(name);
+    write_picture(&path, picture, options).expect("writes");
+    (std::fs::read(&path).expect("reads"), load(&path, &Default::default()).expect("loads"))
+}
+
+#[test]
+fn hdr_is_within_half_a_step_whatever_the_width() {
+    // Without runs, the least with them, runs beyond 127 and others beyond 128, the most with them.
+    for width in [1, 7, 8, 127, 128, 129, 400, 32767, 32768] {
+        let picture = bright(width, 3);
+        let (bytes, back) = written("x.hdr", &picture, &WriteOptions::default());
+        // Another decoder.
+        let decoder = image::codecs::hdr::HdrDecoder::new(std::io::Cursor::new(&bytes)).expect("reads");
+        let other = image::DynamicImage::from_decoder(decoder).expect("decodes").into_rgb32f().into_raw();
+        for i in 0..3 * width {
+            let of = |p: &Picture| ["R", "G", "B"].map(|n| p.plane(n).expect("colour").data[i]);
+            let (was, is) = (of(&picture), of(&back.picture));
+            let most = was.iter().fold(0f32, |a, b| a.max(*b));
+            for c in 0..3 {
+                // Mantissas of the largest are 128 at least, so that half a step is 1 / 256 of it; but 255.5 becomes 256.
+                assert!((was[c] - is[c]).abs() <= most / 255.5, "{was:?} {is:?}");
+                assert_eq!(other[3 * i + c], is[c]);
+            }
+        }
+    }
+}
+
+#[test]
+fn hdr_by_its_definition() {
+    let mut picture = Picture::new(6, 1);
+    picture.push("R", SampleKind::Float, vec![1.0, f32::NAN, 1e-30, f32::INFINITY, 0.999, 0.0]);
+    picture.push("G", SampleKind::Float, vec![0.5, -3.0, 1e-39, 2.0, 0.0, 0.0]);
+    picture.push("B", SampleKind::Float, vec![0.25, 4.0, 0.0, 0.0, 0.0, f32::NEG_INFINITY]);
+    picture.metadata.push(("command".into(), "two\nlines".into()));
+    let (bytes, _) = written("x.hdr", &picture, &WriteOptions::default());
+    let head = b"#?RADIANCE\n# command=twolines\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 6\n";
+    let pixels: [[u8; 4]; 6] = [
+        // 1 = 128 * 2^(129 - 136).
+        [128, 64, 32, 129],
+        [0, 0, 128, 131],
+        // 1e-30 = 0.633825 * 2^-99; 256 times that is 162.3.
+        [162, 0, 0, 29],
+        [255, 0, 0, 255],
+        // 0.999 * 256 = 255.7 is 256, which the next exponent holds.
+        [128, 0, 0, 129],
+        [0; 4],
+    ];
+    assert_eq!(bytes, [&head[..], &pixels.concat()].concat());
+}
+
+#[test]
+fn pfm_and_tiff_of_floats_come_back_bit_for_bit() {
+    let mut picture = bright(9, 5);
+    picture.planes[0].data[..3].copy_from_slice(&[f32::INFINITY, -1.5, 1e-42]);
+    let mut gray = Picture::new(9, 5);
+    gray.push("Y", SampleKind::Half, picture.planes[0].data.clone());
+    let mut covered = picture.clone();
+    covered.push("A", SampleKind::Half, (0..45).map(|i| i as f32 / 44.0).collect());
+    for name in ["x.pfm", "x.tiff", "x.TIF"] {
+        for alpha in [false, true] {
+            for picture in [&picture, &gray, &covered] {
+                let options = WriteOptions { alpha, ..WriteOptions::default() };
+                let (_, back) = written(name, picture, &options);
+                assert_eq!(back.stored, Stored::Float);
+                let wanted = picture.planes.iter().filter(|p| alpha || p.name != "A");
+                assert_eq!(back.picture.planes.len(), wanted.clone().count(), "{name}");
+                for plane in wanted {
+                    let read = back.picture.plane(&plane.name).expect("there");
+                    assert_eq!(read.data, plane.data, "{name} {}", plane.name);
+                }
+            }
+        }
+    }
+    let (bytes, _) = written("x.pfm", &gray, &WriteOptions::default());
+    assert_eq!(bytes[..11], *b"Pf\n9 5\n-1.0");
+    assert_eq!(bytes.len(), 12 + 4 * 45);
+}
+
+#[test]
+fn sixteen_bits_of_png_and_tiff_are_the_nearest() {
+    let mut picture = Picture::new(300, 10);
+    let ramp: Vec<f32> = (0..3000).map(|i| i as f32 / 2999.0).collect();
+    for name in ["R", "G", "B", "A"] {
+        let data = ramp.iter().map(|&v| if name == "A" { 1.0 } else { srgb_to_linear(v) }).collect();
+        picture.push(name, SampleKind::Float, data);
+    }
+    for (name, bits, most) in [("x.png", 16, 65535.0), ("x.tiff", 16, 65535.0), ("x.tiff", 8, 255.0f32)] {
+        let options = WriteOptions { alpha: true, bits: Some(bits), ..WriteOptions::default() };
+        let (_, back) = written(name, &picture, &options);
+        assert_eq!(back.stored, Stored::Integer { bits, encoding: Default::default() });
+        for (i, (was, is)) in ramp.iter().zip(&back.picture.plane("G").expect("green").data).enumerate() {
+            // Half a step, and the curve there and back in f32.
+            assert!((was - is).abs() <= 0.5 / most + 1e-6, "{name} {bits} {i}: {was} {is}");
+        }
+        assert!(back.picture.plane("A").expect("alpha").data.iter().all(|a| *a == 1.0));
+    }
+}
+
+#[test]
+fn bits_that_a_format_does_not_have_are_refused() {
+    let dir = tempfile::tempdir().expect("folder");
+    let cases =
+        [("x.png", 32, "8 or 16"), ("x.jpg", 16, "but 8"), ("x.hdr", 32, "but 8"), ("x.pfm", 16, "but 32")];
+    for (name, bits, words) in cases {
+        let options = WriteOptions { bits: Some(bits), ..WriteOptions::default() };
+        let e = write_picture(&dir.path().join(name), &bright(2, 2), &options).expect_err("refused");
+        assert!(e.to_string().contains(words) && e.exit_code() == 2, "{e}");
+    }
+    assert_eq!(std::fs::read_dir(dir.path()).expect("lists").count(), 0);
 }

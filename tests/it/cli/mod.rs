@@ -4,6 +4,7 @@ mod bad_input;
 mod bench;
 mod bench_error;
 mod compare;
+mod convert;
 mod crosscheck;
 mod denoise;
 mod folder;
