@@ -182,7 +182,7 @@ fn cell(check: Check, e: &Entry) -> Cell {
         Standing::Reported if t.failed > 0 => Tone::Plain,
         Standing::Reported | Standing::Untried => Tone::Dim,
     };
-    Cell { text: cell_text(check, t, e.standing), value: Some(t.failed as f64), tone }
+    Cell { text: cell_text(check, t, e.standing), value: Some(t.failed as f64), tone, ..Cell::default() }
 }
 
 fn cell_text(check: Check, t: &Tally, standing: Standing) -> String {

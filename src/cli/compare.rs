@@ -5,6 +5,7 @@ use super::{Setting, interrupt, print};
 use crate::base::image_data::Encoding;
 use crate::compare::comparison::{CompareOptions, Comparison, compare};
 use crate::compare::folders;
+use crate::compare::html::{self, Shown};
 use crate::compare::limits::Limit;
 use crate::compare::metrics::{self, MetricOptions, PIXELS_PER_DEGREE};
 use crate::compare::open::{Crop, Mask, PairOptions, Source};
@@ -101,6 +102,12 @@ struct OutputArgs {
     /// Write the table as Markdown, too; - is stdout
     #[arg(long, value_name = "FILE")]
     markdown: Option<PathBuf>,
+    /// Write a page to look at, too: wipe, flip, heat maps, values of pixels
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// Keep every value of the page to the last bit, for a larger file
+    #[arg(long, requires = "html")]
+    lossless: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -153,11 +160,11 @@ struct Record<'a> {
 /// Runs the verb.
 pub fn run(args: &CompareArgs, setting: &Setting) -> Result<()> {
     let o = &args.output;
-    let files = [&o.json, &o.csv, &o.markdown];
+    let files = [&o.json, &o.csv, &o.markdown, &o.html];
     files.into_iter().flatten().filter(|p| !is_stdout(p)).try_for_each(|p| check_file(p))?;
     let options = args.options()?;
     let (pairs, alone) = args.pairs()?;
-    let mut comparisons = Vec::new();
+    let (mut comparisons, mut shown) = (Vec::new(), Vec::new());
     let mut kept: Option<Source> = None;
     for [reference, test] in &pairs {
         let source = match kept.take().filter(|k| k.path == *reference) {
@@ -166,12 +173,23 @@ pub fn run(args: &CompareArgs, setting: &Setting) -> Result<()> {
         };
         let test = Source::read(test, &options.load)?;
         let compare_options = options.of(&source)?;
-        let (comparison, _) = compare(&source, &test, &compare_options)?;
+        let (comparison, pair) = compare(&source, &test, &compare_options)?;
+        match o.html {
+            Some(_) => shown.push(Shown::new(comparison.clone(), &pair, &source, &test)),
+            None => {}
+        }
         comparisons.push(comparison);
         kept = Some(source);
     }
     let missed = args.missed(&comparisons, &alone);
-    interrupt::hold_off(|| args.write(&comparisons, &alone, &missed))?;
+    let page = match o.html {
+        Some(_) => Some(html::report(&shown, &Machine::here(), o.lossless, Vec::new()).to_html()?),
+        None => None,
+    };
+    interrupt::hold_off(|| {
+        o.html.as_deref().zip(page).map_or(Ok(()), |(path, page)| write_file(path, page.as_bytes()))?;
+        args.write(&comparisons, &alone, &missed)
+    })?;
     if !setting.quiet {
         missed.iter().for_each(|m| log::info!("{m}"));
     }
@@ -218,7 +236,12 @@ impl Options<'_> {
             pixels_per_degree: choices.ppd.map_or(PIXELS_PER_DEGREE, |p| p as f32),
             keep_space: space.is_some(),
         };
-        Ok(CompareOptions { pair, metrics: self.metrics.clone(), choices, maps: false })
+        Ok(CompareOptions {
+            pair,
+            metrics: self.metrics.clone(),
+            choices,
+            maps: self.args.output.html.is_some(),
+        })
     }
 }
 

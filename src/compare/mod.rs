@@ -7,6 +7,7 @@ pub mod causes;
 pub mod comparison;
 pub mod flip;
 pub mod folders;
+pub mod html;
 pub mod invalid;
 pub mod limits;
 pub mod metrics;

@@ -21,6 +21,7 @@ pub mod table;
 #[cfg(test)]
 mod tests;
 mod view;
+pub mod viewer;
 
 use crate::error::{Error, Result};
 use bars::Bars;
@@ -29,6 +30,7 @@ use machine::Machine;
 use minijinja::Environment;
 use serde::Serialize;
 use table::Table;
+use viewer::Viewer;
 
 /// A page. All text is plain: what HTML would read as markup is escaped.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -106,6 +108,9 @@ pub enum Block {
     Lines(Lines),
     /// A picture. Neighbours stand side by side where there is room.
     Picture(Picture),
+    /// Pictures to be looked at in many ways.
+    #[serde(skip)]
+    Viewer(Viewer),
     /// What is shown when asked for.
     Details(Details),
 }
@@ -168,6 +173,12 @@ impl From<Lines> for Block {
 impl From<Picture> for Block {
     fn from(p: Picture) -> Self {
         Block::Picture(p)
+    }
+}
+
+impl From<Viewer> for Block {
+    fn from(v: Viewer) -> Self {
+        Block::Viewer(v)
     }
 }
 
@@ -248,9 +259,9 @@ impl Report {
             subtitle: &self.subtitle,
             verdict: self.verdict.as_ref(),
             record: &self.record,
-            sections: self.sections.iter().map(view::section).collect(),
+            sections: self.sections.iter().map(view::section).collect::<Result<_>>()?,
             css: include_str!("page.css"),
-            js: include_str!("page.js"),
+            js: scripts(),
             version: env!("CARGO_PKG_VERSION"),
         };
         page.render(minijinja::value::Serde(&content)).map_err(fail)
@@ -266,6 +277,17 @@ struct Page<'a> {
     record: &'a [(String, String)],
     sections: Vec<view::SectionView<'a>>,
     css: &'a str,
-    js: &'a str,
+    js: String,
     version: &'a str,
+}
+
+/// All of the page's script.
+fn scripts() -> String {
+    let parts = [
+        include_str!("page.js"),
+        include_str!("viewer/values.js"),
+        include_str!("viewer/viewer.js"),
+        include_str!("viewer/controls.js"),
+    ];
+    parts.concat()
 }

@@ -43,6 +43,8 @@ pub struct Cell {
     pub value: Option<f64>,
     /// How it is meant.
     pub tone: Tone,
+    /// An explanation, shown where the pointer rests or the keyboard's focus is; may be empty.
+    pub help: String,
 }
 
 /// How a cell is meant.
@@ -81,12 +83,18 @@ impl Column {
 impl Cell {
     /// A number as it is written; one that is not finite sorts as text.
     pub fn number(value: f64, text: impl Into<String>) -> Self {
-        Cell { text: text.into(), value: value.is_finite().then_some(value), tone: Tone::Plain }
+        Cell { text: text.into(), value: value.is_finite().then_some(value), ..Cell::default() }
     }
 
     /// Where there is nothing to say.
     pub fn none() -> Self {
         Cell::from("-").tone(Tone::Dim)
+    }
+
+    /// What it is.
+    pub fn help(mut self, text: impl Into<String>) -> Self {
+        self.help = text.into();
+        self
     }
 
     /// How it is meant.

@@ -4,7 +4,9 @@
 use super::bars::{COLORS, DrawnGroup};
 use super::lines::Drawn;
 use super::table::Table;
+use super::viewer::Drawn as DrawnViewer;
 use super::{Block, Picture, Section};
+use crate::error::Result;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde::Serialize;
@@ -37,14 +39,15 @@ enum BlockView<'a> {
     Bars { caption: &'a str, legend: Vec<Legend<'a>>, groups: Vec<DrawnGroup<'a>> },
     Lines { caption: &'a str, x: &'a str, y: &'a str, drawn: Drawn<'a> },
     Pictures { pictures: Vec<PictureView<'a>> },
+    Viewer { viewer: DrawnViewer },
     Details { summary: &'a str, open: bool, items: &'a [String], blocks: Vec<BlockView<'a>> },
 }
 
-pub(super) fn section(s: &Section) -> SectionView<'_> {
-    SectionView { heading: &s.heading, blocks: blocks(&s.blocks) }
+pub(super) fn section(s: &Section) -> Result<SectionView<'_>> {
+    Ok(SectionView { heading: &s.heading, blocks: blocks(&s.blocks)? })
 }
 
-fn blocks(list: &[Block]) -> Vec<BlockView<'_>> {
+fn blocks(list: &[Block]) -> Result<Vec<BlockView<'_>>> {
     let mut out = Vec::new();
     for block in list {
         let view = match block {
@@ -68,16 +71,17 @@ fn blocks(list: &[Block]) -> Vec<BlockView<'_>> {
                 }
                 BlockView::Pictures { pictures: vec![picture(p)] }
             }
+            Block::Viewer(v) => BlockView::Viewer { viewer: v.drawn()? },
             Block::Details(d) => BlockView::Details {
                 summary: &d.summary,
                 open: d.open,
                 items: &d.items,
-                blocks: blocks(&d.blocks),
+                blocks: blocks(&d.blocks)?,
             },
         };
         out.push(view);
     }
-    out
+    Ok(out)
 }
 
 fn picture(p: &Picture) -> PictureView<'_> {
