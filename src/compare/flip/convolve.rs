@@ -1,13 +1,9 @@
 //! The passes of FLIP's filters over one tile, along rows and then along columns, sixteen pixels at a time. Weights are
 //! halves ([`Half`]): what lies at equal distance on both sides is added, or subtracted, first.
 
-use super::kernels::Half;
+use super::kernels::{Half, Kernels};
+use crate::compare::lanes::{LANES, Lanes, add, filtered, load, plus, scale, store, sub};
 use crate::math::simd::Kernel;
-
-/// Pixels worked on together: one vector on processors that have the widest. Widths of tiles are multiples of it.
-pub(super) const LANES: usize = 16;
-
-type Lanes = [f32; LANES];
 
 /// A plane of a tile: rows of `stride` values, of which those that a pass writes start at 0.
 #[derive(Debug, Clone, Copy)]
@@ -17,38 +13,7 @@ pub(super) struct Source<'a> {
 }
 
 #[inline(always)]
-fn load(data: &[f32], at: usize) -> Lanes {
-    *data[at..].first_chunk().expect("tiles have room for whole vectors")
-}
-
-#[inline(always)]
-fn store(data: &mut [f32], at: usize, v: Lanes) {
-    *data[at..].first_chunk_mut().expect("tiles have room for whole vectors") = v;
-}
-
-#[inline(always)]
-fn add(a: Lanes, b: Lanes) -> Lanes {
-    std::array::from_fn(|i| a[i] + b[i])
-}
-
-#[inline(always)]
-fn sub(a: Lanes, b: Lanes) -> Lanes {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-#[inline(always)]
-fn scale(a: Lanes, by: f32) -> Lanes {
-    std::array::from_fn(|i| a[i] * by)
-}
-
-/// `a + b * by`.
-#[inline(always)]
-fn plus(a: Lanes, b: Lanes, by: f32) -> Lanes {
-    std::array::from_fn(|i| a[i] + b[i] * by)
-}
-
-#[inline(always)]
-fn length(a: Lanes, b: Lanes) -> Lanes {
+fn length(a: Lanes<f32>, b: Lanes<f32>) -> Lanes<f32> {
     std::array::from_fn(|i| (a[i] * a[i] + b[i] * b[i]).sqrt())
 }
 
@@ -68,20 +33,10 @@ impl<const N: usize> Kernel for AlongRows<'_, N> {
 
     #[inline(always)]
     fn run(mut self) {
-        let n = self.halves[0].len();
-        let halves = self.halves.map(|h| &h[..n]);
         let rows = self.source.data.chunks_exact(self.source.stride).take(self.out[0].len() / self.width);
         for (y, row) in rows.enumerate() {
             for x in (0..self.width).step_by(LANES) {
-                let middle = x + self.margin;
-                let center = load(row, middle);
-                let mut sums = halves.map(|h| scale(center, h[0]));
-                for k in 1..n {
-                    let pair = add(load(row, middle - k), load(row, middle + k));
-                    for (s, h) in sums.iter_mut().zip(&halves) {
-                        *s = plus(*s, pair, h[k]);
-                    }
-                }
+                let sums = filtered(row, x + self.margin, 1, self.halves.map(|h| &h[..]));
                 for (out, s) in self.out.iter_mut().zip(sums) {
                     store(out, y * self.width + x, s);
                 }
@@ -107,21 +62,13 @@ impl<const N: usize> Kernel for AlongColumns<'_, N> {
     #[inline(always)]
     fn run(self) {
         let (n, width) = (self.halves[0].len(), self.width);
-        let halves = self.halves.map(|h| &h[..n]);
         for (y, out) in self.out.chunks_exact_mut(width).enumerate() {
             for x in (0..width).step_by(LANES) {
                 let middle = (y + n - 1) * width + x;
-                let mut sums: [Lanes; N] =
-                    std::array::from_fn(|i| scale(load(self.sources[i], middle), halves[i][0]));
-                for k in 1..n {
-                    let reach = k * width;
-                    for ((s, h), source) in sums.iter_mut().zip(&halves).zip(&self.sources) {
-                        *s = plus(*s, add(load(source, middle - reach), load(source, middle + reach)), h[k]);
-                    }
-                }
-                let mut total = sums[0];
-                for s in &sums[1..] {
-                    total = add(total, *s);
+                let mut total = [0.0; LANES];
+                for (source, half) in self.sources.iter().zip(&self.halves) {
+                    let [sum] = filtered(source, middle, width, [&half[..n]]);
+                    total = add(total, sum);
                 }
                 store(out, x, total);
             }
@@ -134,7 +81,7 @@ pub(super) struct DetectRows<'a> {
     pub source: Source<'a>,
     pub margin: usize,
     pub width: usize,
-    pub filters: &'a super::kernels::Kernels,
+    pub filters: &'a Kernels,
     /// Smoothed, first derivative, second derivative.
     pub out: [&'a mut [f32]; 3],
 }
@@ -177,7 +124,7 @@ pub(super) struct DetectColumns<'a> {
     /// Smoothed, first derivative, second derivative.
     pub sources: [&'a [f32]; 3],
     pub width: usize,
-    pub filters: &'a super::kernels::Kernels,
+    pub filters: &'a Kernels,
     /// Length of the gradient.
     pub edges: &'a mut [f32],
     /// Length of the second derivatives.

@@ -49,7 +49,8 @@ impl Kernels {
         let (gauss, first, second) = detectors(ppd);
         Kernels {
             sensitivity: [cut(&y, sum(&y)), cut(&cx, sum(&cx))],
-            blue_yellow: [cut(&cz1, norm), cut(&cz2, norm)],
+            // Of one length: both are worked out together.
+            blue_yellow: [divided(&cz1, norm), divided(&cz2, norm)],
             gauss,
             first,
             second,
@@ -76,7 +77,11 @@ fn cut(half: &[f64], norm: f64) -> Half {
         len -= 1;
         lost += 2.0 * half[len] / norm;
     }
-    half[..len].iter().map(|w| (w / norm) as f32).collect()
+    divided(&half[..len], norm)
+}
+
+fn divided(half: &[f64], norm: f64) -> Half {
+    half.iter().map(|w| (w / norm) as f32).collect()
 }
 
 fn detectors(ppd: f64) -> (Half, Half, Half) {
@@ -88,9 +93,8 @@ fn detectors(ppd: f64) -> (Half, Half, Half) {
     let second: Vec<f64> = gauss.iter().enumerate().map(|(k, g)| (x(k) * x(k) - 1.0) * g).collect();
     let of = |sign: f64| sum(&second.iter().map(|w| (sign * w).max(0.0)).collect::<Vec<_>>());
     let (positive, negative) = (of(1.0), of(-1.0));
-    let scaled = |half: &[f64], by: f64| half.iter().map(|w| (w / by) as f32).collect();
     let second = second.iter().map(|w| (w / if *w > 0.0 { positive } else { negative }) as f32).collect();
-    (scaled(&gauss, sum(&gauss)), scaled(&first, first.iter().sum()), second)
+    (divided(&gauss, sum(&gauss)), divided(&first, first.iter().sum()), second)
 }
 
 #[cfg(test)]

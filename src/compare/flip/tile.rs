@@ -1,9 +1,10 @@
 //! FLIP over one tile: what fits in a core's cache, for every exposure while it is there.
 
 use super::colour::{Colours, amplified, decode, unit};
-use super::convolve::{AlongColumns, AlongRows, DetectColumns, DetectRows, LANES, Source};
+use super::convolve::{AlongColumns, AlongRows, DetectColumns, DetectRows, Source};
 use super::kernels::Kernels;
 use super::tone::ToneMapper;
+use crate::compare::lanes::LANES;
 use crate::math::simd::{Kernel, dispatch};
 
 /// Tiles are this wide and high, if the picture is.
