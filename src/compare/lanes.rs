@@ -29,26 +29,38 @@ pub(super) fn store<T: Copy>(data: &mut [T], at: usize, v: Lanes<T>) {
 
 /// `a + b`.
 #[inline(always)]
-pub(super) fn add<T: Number>(a: Lanes<T>, b: Lanes<T>) -> Lanes<T> {
-    std::array::from_fn(|i| a[i] + b[i])
+pub(super) fn add<T: Number>(mut a: Lanes<T>, b: Lanes<T>) -> Lanes<T> {
+    for (a, b) in a.iter_mut().zip(b) {
+        *a = *a + b;
+    }
+    a
 }
 
 /// `a - b`.
 #[inline(always)]
-pub(super) fn sub<T: Number>(a: Lanes<T>, b: Lanes<T>) -> Lanes<T> {
-    std::array::from_fn(|i| a[i] - b[i])
+pub(super) fn sub<T: Number>(mut a: Lanes<T>, b: Lanes<T>) -> Lanes<T> {
+    for (a, b) in a.iter_mut().zip(b) {
+        *a = *a - b;
+    }
+    a
 }
 
 /// `a * by`.
 #[inline(always)]
-pub(super) fn scale<T: Number>(a: Lanes<T>, by: T) -> Lanes<T> {
-    std::array::from_fn(|i| a[i] * by)
+pub(super) fn scale<T: Number>(mut a: Lanes<T>, by: T) -> Lanes<T> {
+    for a in &mut a {
+        *a = *a * by;
+    }
+    a
 }
 
 /// `a + b * by`.
 #[inline(always)]
-pub(super) fn plus<T: Number>(a: Lanes<T>, b: Lanes<T>, by: T) -> Lanes<T> {
-    std::array::from_fn(|i| a[i] + b[i] * by)
+pub(super) fn plus<T: Number>(mut a: Lanes<T>, b: Lanes<T>, by: T) -> Lanes<T> {
+    for (a, b) in a.iter_mut().zip(b) {
+        *a = *a + b * by;
+    }
+    a
 }
 
 /// Filters of `data` around the lanes from `middle` on, by values that are `step` apart: 1 along a row, a row's length along
@@ -62,8 +74,10 @@ pub(super) fn filtered<T: Number, const N: usize>(
 ) -> [Lanes<T>; N] {
     let n = weights[0].len();
     let weights = weights.map(|w| &w[..n]);
-    let center = load(data, middle);
-    let mut sums = weights.map(|w| scale(center, w[0]));
+    let mut sums = [load(data, middle); N];
+    for (s, w) in sums.iter_mut().zip(&weights) {
+        *s = scale(*s, w[0]);
+    }
     for k in 1..n {
         let pair = add(load(data, middle - k * step), load(data, middle + k * step));
         for (s, w) in sums.iter_mut().zip(&weights) {

@@ -105,13 +105,16 @@ impl Colours {
     /// Hunt-adjusted CIELAB of YCxCz, as far as that is a colour of the display.
     #[inline(always)]
     pub fn seen(&self, ycxcz: [f32; 3]) -> [f32; 3] {
-        self.hunt(self.from_ycxcz.apply(ycxcz).map(unit))
+        // `map` would be a call, for the plainest instructions.
+        let [r, g, b] = self.from_ycxcz.apply(ycxcz);
+        self.hunt([unit(r), unit(g), unit(b)])
     }
 
     /// Hunt-adjusted CIELAB of linear Rec. 709 in [0, 1].
     #[inline(always)]
     fn hunt(&self, linear: [f32; 3]) -> [f32; 3] {
-        let [x, y, z] = self.to_xyz.apply(linear).map(lightness);
+        let [x, y, z] = self.to_xyz.apply(linear);
+        let [x, y, z] = [lightness(x), lightness(y), lightness(z)];
         let l = 116.0 * y - 16.0;
         let adjusted = 0.01 * l;
         [l, adjusted * (500.0 * (x - y)), adjusted * (200.0 * (y - z))]

@@ -13,8 +13,11 @@ pub(super) struct Source<'a> {
 }
 
 #[inline(always)]
-fn length(a: Lanes<f32>, b: Lanes<f32>) -> Lanes<f32> {
-    std::array::from_fn(|i| (a[i] * a[i] + b[i] * b[i]).sqrt())
+fn length(mut a: Lanes<f32>, b: Lanes<f32>) -> Lanes<f32> {
+    for (a, b) in a.iter_mut().zip(b) {
+        *a = (*a * *a + b * b).sqrt();
+    }
+    a
 }
 
 /// Symmetric filters along rows: for every one of `out`, whose rows are of `width`.

@@ -11,6 +11,8 @@ mod convolve;
 mod kernels;
 mod power;
 mod summary;
+#[cfg(test)]
+pub(in crate::compare) mod tests;
 mod tile;
 mod tone;
 

@@ -8,7 +8,7 @@ use crate::compare::lanes::LANES;
 use crate::math::simd::{Kernel, dispatch};
 
 /// Tiles are this wide and high, if the picture is.
-pub(super) const TILE: [usize; 2] = [256, 64];
+pub(super) const TILE: [usize; 2] = [128, 96];
 
 /// How the values of the two pictures become light on a display.
 #[derive(Debug, Clone, Copy)]

@@ -6,6 +6,8 @@
 //! order that depends on the size of the picture alone.
 
 mod scales;
+#[cfg(test)]
+mod tests;
 mod tile;
 
 pub use scales::{MultiScale, WEIGHTS, multi_scale};

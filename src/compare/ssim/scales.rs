@@ -4,7 +4,7 @@ use super::{Options, Ssim, measure, ssim};
 use crate::error::Result;
 use rayon::prelude::*;
 
-/// Exponents of the scales, the finest first: Wang, Simoncelli, Bovik 2003, section 3.2.
+/// Exponents of the scales, the finest first: Wang, Simoncelli, Bovik 2003, section 3.2. Their sum is 1.0001, there as here.
 pub const WEIGHTS: [f64; 5] = [0.0448, 0.2856, 0.3001, 0.2363, 0.1333];
 
 /// Multi-scale similarity of two pictures of `C` channels.
@@ -22,7 +22,7 @@ pub struct MultiScale<const C: usize> {
 /// and structure, that of the coarsest scale times luminance, each to the power of its weight. A negative mean counts as 0.
 ///
 /// A scale is the means of blocks of 2x2 pixels of the one before; a last odd row or column is left out. Where a
-/// scale would be smaller than the window, there are fewer, and their weights are divided by their sum. `first` is what
+/// scale would be smaller than the window, there are fewer, whose weights are scaled so that the sum stays. `first` is what
 /// [`ssim()`] made of the same pictures and options, if that is at hand: it is the finest scale.
 ///
 /// # Errors
@@ -51,11 +51,12 @@ pub fn multi_scale<const C: usize>(
         size = size.map(|n| n / 2);
     }
     let scales = found.len();
-    let total: f64 = WEIGHTS[..scales].iter().sum();
+    let sum = |weights: &[f64]| weights.iter().sum::<f64>();
+    let more = sum(&WEIGHTS) / sum(&WEIGHTS[..scales]);
     let channels: [f64; C] = std::array::from_fn(|c| {
         let factors = found.iter().zip(WEIGHTS).enumerate().map(|(i, ((whole, contrast), weight))| {
             let mean = if i + 1 == scales { whole[c] } else { contrast[c] };
-            mean.max(0.0).powf(weight / total)
+            mean.max(0.0).powf(weight * more)
         });
         factors.product()
     });
