@@ -9,6 +9,7 @@ pub mod flip;
 pub mod folders;
 pub mod html;
 pub mod invalid;
+mod lanes;
 pub mod limits;
 pub mod metrics;
 pub mod open;
