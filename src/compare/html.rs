@@ -106,7 +106,14 @@ fn verdict(all: &[&Comparison]) -> Verdict {
             return Verdict::bad(format!("Likely cause: {} ({share:.0} % of the difference).", cause.text));
         }
         let of = |name: &str| only.value(name);
-        let percent = of("relmse").map(|v| format!("relative RMSE {:.3} %", 100.0 * v.sqrt()));
+        let root = |v: f64| format!("{:.3} %", 100.0 * v.sqrt());
+        let percent = of("relmse").map(|v| match of("relmse-trimmed").filter(|t| 2.0 * t < v) {
+            Some(trimmed) => {
+                let rest = root(trimmed);
+                format!("relative RMSE {}, of all but a thousandth of the pixels {rest}", root(v))
+            }
+            None => format!("relative RMSE {}", root(v)),
+        });
         let flip = of("flip").map(|v| format!("FLIP {v:.4}"));
         let parts: Vec<String> = [percent, flip].into_iter().flatten().collect();
         let text = if parts.is_empty() { "The pictures differ".to_owned() } else { parts.join(", ") };

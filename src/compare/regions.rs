@@ -11,9 +11,9 @@ pub struct Region {
     pub at: [usize; 2],
     /// Width and height, pixels.
     pub size: [usize; 2],
-    /// Its share of the sum of relative squared errors, from 0 to 1.
+    /// Its share of the sum of relative squared errors, each at most 1.
     pub share: f64,
-    /// Root of its mean relative squared error.
+    /// Root of its mean of these.
     pub error: f64,
 }
 
@@ -28,7 +28,8 @@ pub fn worst(input: &Input) -> Vec<Region> {
     let [w, h] = pair.size;
     let side = (w.min(h) / ACROSS).clamp(8, 128);
     let (epsilon, _) = input.epsilon();
-    let map = pointwise::map(pair, |r, t| (t - r).powi(2) / (r * r + epsilon));
+    // No pixel counts for more than one that is off by its own size: a few outliers would be all that is told.
+    let map = pointwise::map(pair, |r, t| ((t - r).powi(2) / (r * r + epsilon)).min(1.0));
     let blocks = [w.div_ceil(side), h.div_ceil(side)];
     let mut sums = vec![0.0; blocks[0] * blocks[1]];
     for (i, v) in map.iter().enumerate() {

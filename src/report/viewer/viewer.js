@@ -73,7 +73,7 @@ class Viewer {
   map() {
     const { test, map } = this.state, key = `map ${test} ${map}`;
     if (!this.shown.has(key)) {
-      for (const k of this.shown.keys()) if (k.startsWith("map")) this.shown.delete(k);
+      for (const k of this.shown.keys()) if (typeof k === "string") this.shown.delete(k);
       const m = this.maps[map];
       const values = m.bytes ? Float32Array.from(m.bytes, (b) => (b / 255) * m.high) : errorValues(m, this.pictures[0], this.pictures[test], this.epsilon);
       const high = m.bytes ? m.high : mostly(values);
@@ -101,7 +101,9 @@ class Viewer {
   }
 
   resize() {
-    const box = this.canvas.parentElement.getBoundingClientRect(), dpr = window.devicePixelRatio || 1;
+    const stage = this.canvas.parentElement;
+    stage.style.setProperty("--ideal", `${Math.round((stage.clientWidth * this.height) / this.width)}px`);
+    const box = stage.getBoundingClientRect(), dpr = window.devicePixelRatio || 1;
     const fitted = this.state.scale === 0 || Math.abs(this.state.scale - (this.fitted ?? 0)) < 1e-9;
     this.box = [box.width, box.height];
     this.canvas.width = Math.max(1, Math.round(box.width * dpr));
@@ -118,11 +120,13 @@ class Viewer {
     if (mode === "flip") return [{ ...whole, shows: ["picture", front === 0 ? 0 : test] }];
     if (mode === "map") return [{ ...whole, shows: ["map"] }];
     const list = [["picture", 0], ["picture", test], ["map"]], gap = 2, n = list.length;
-    const across = w * this.height > h * this.width * 0.9 || w > 900;
-    const side = across ? (w - gap * (n - 1)) / n : (h - gap * (n - 1)) / n;
-    return list.map((shows, i) => across
-      ? { x: i * (side + gap), y: 0, w: side, h, shows }
-      : { x: 0, y: i * (side + gap), w, h: side, shows });
+    // As many columns as make pictures largest.
+    const sized = [1, 2, 3].map((columns) => {
+      const rows = Math.ceil(n / columns), pw = (w - gap * (columns - 1)) / columns, ph = (h - gap * (rows - 1)) / rows;
+      return { columns, pw, ph, scale: Math.min(pw / this.width, ph / this.height) };
+    });
+    const { columns, pw, ph } = sized.reduce((a, b) => (b.scale > a.scale * 1.001 ? b : a));
+    return list.map((shows, i) => ({ x: (i % columns) * (pw + gap), y: Math.floor(i / columns) * (ph + gap), w: pw, h: ph, shows }));
   }
 
   fit() {
@@ -248,7 +252,7 @@ class Viewer {
     const rgb = (i) => [0, 1, 2].map((c) => this.pictures[i][3 * at + c]);
     const line = (name, values) => [name, ...values];
     const rows = shows
-      ? [line(this.config.pictures[0].name, rgb(0).map(short)), line(this.config.pictures[test].name, rgb(test).map(short)),
+      ? [line(this.config.pictures[0].name, rgb(0).map((v) => short(v))), line(this.config.pictures[test].name, rgb(test).map((v) => short(v))),
          line("difference", rgb(test).map((v, c) => short(v - rgb(0)[c], true)))]
       : [line(this.config.pictures[0].name, ["", "", ""]), line(this.config.pictures[test].name, ["", "", ""]), line("difference", ["", "", ""])];
     const place = shows ? `${Math.floor(here.px) + this.config.origin[0]}, ${Math.floor(here.py) + this.config.origin[1]}` : "–";
