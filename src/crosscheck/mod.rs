@@ -8,6 +8,7 @@
 
 pub mod compare;
 pub mod crossing;
+pub mod equivalence;
 pub mod html;
 pub mod judge;
 pub mod leaf_ray;

@@ -185,9 +185,10 @@ mod tests {
         let x = 6.0f64;
         let chi = erfc(x.sqrt()) + 2.0 * (x / std::f64::consts::PI).sqrt() * (-x).exp();
         close(f_tail(2.0 * x / 3.0, 3.0, 1e9), chi, 2e-5);
-        assert_eq!([f_tail(0.0, 3.0, 5.0), f_tail(f64::INFINITY, 3.0, 5.0), student_tail(0.0, 7.0)], [
-            1.0, 0.0, 0.5
-        ]);
+        assert_eq!(
+            [f_tail(0.0, 3.0, 5.0), f_tail(f64::INFINITY, 3.0, 5.0), student_tail(0.0, 7.0)],
+            [1.0, 0.0, 0.5]
+        );
     }
 
     #[test]

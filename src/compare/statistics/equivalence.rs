@@ -169,9 +169,10 @@ impl Equivalence {
                 // The largest reach at the level of the tests, for large degrees of freedom.
                 let reach = |c: &ChannelAnswer| c.value.abs() + 1.645 * c.error;
                 let most = self.channels.iter().map(reach).fold(0.0, f64::max);
-                format!("equivalent: the means differ by less than {margin} (at most {} with 95 % confidence)", {
-                    super::verdict::percent(most)
-                })
+                format!(
+                    "equivalent: the means differ by less than {margin} (at most {} with 95 % confidence)",
+                    { super::verdict::percent(most) }
+                )
             }
             Answer::Different => {
                 let far = self.channels.iter().min_by(|a, b| a.p_within.total_cmp(&b.p_within));
@@ -207,4 +208,3 @@ fn colour(channel: &str) -> &'static str {
         _ => "blue",
     }
 }
-

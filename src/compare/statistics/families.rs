@@ -88,7 +88,8 @@ mod tests {
         let uniform = |i: u64, k: u64| (mix64(mix64(i).wrapping_add(k)) >> 11) as f64 / (1u64 << 53) as f64;
         let weights = [0.5, 0.3, 0.2];
         let count = |p: &dyn Fn(u64) -> [f64; 3]| {
-            let below = |i: &u64| combined(&std::array::from_fn::<_, 3, _>(|k| (weights[k], p(*i)[k]))) <= 0.01;
+            let below =
+                |i: &u64| combined(&std::array::from_fn::<_, 3, _>(|k| (weights[k], p(*i)[k]))) <= 0.01;
             (0..100_000).filter(below).count() as f64
         };
         // Independent, and the same: 1 % of 100,000, to four deviations.

@@ -22,8 +22,10 @@ impl StatisticalResult {
             Column::number("red"),
             Column::number("green"),
             Column::number("blue"),
-            Column::number("p").help("how often chance alone brings as much or more, in any mixture of channels"),
-            Column::number("would see").help("bias of all channels alike that this test would have seen with 95 % probability"),
+            Column::number("p")
+                .help("how often chance alone brings as much or more, in any mixture of channels"),
+            Column::number("would see")
+                .help("bias of all channels alike that this test would have seen with 95 % probability"),
             Column::number("within").help("both are the same within this share, with 95 % confidence"),
             Column::text("verdict"),
         ]);
@@ -72,7 +74,9 @@ impl StatisticalResult {
     pub fn uniformity_text(&self) -> String {
         match &self.uniformity {
             None => "too few tiles to tell".into(),
-            Some(u) if u.p >= self.alpha => format!("uniform, as without a difference (Kolmogorov p {:.2})", u.p),
+            Some(u) if u.p >= self.alpha => {
+                format!("uniform, as without a difference (Kolmogorov p {:.2})", u.p)
+            }
             Some(u) => format!("not uniform (Kolmogorov p {:.1e})", u.p),
         }
     }

@@ -116,7 +116,8 @@ impl Replicates {
                 )));
             }
         }
-        let halves: Option<Vec<Replicates>> = pictures.iter().map(|(_, p)| Replicates::of_halves(p)).collect();
+        let halves: Option<Vec<Replicates>> =
+            pictures.iter().map(|(_, p)| Replicates::of_halves(p)).collect();
         let all = match halves {
             Some(halves) => {
                 let parts = halves.iter().flat_map(|h| h.parts.clone()).collect();
@@ -203,7 +204,11 @@ impl Replicates {
     ///
     /// # Panics
     /// If there are less than two, or lengths are not that of the size.
-    pub fn of_values(size: [usize; 2], spread: Spread, parts: Vec<(Vec<[f32; 3]>, Option<Vec<f32>>)>) -> Self {
+    pub fn of_values(
+        size: [usize; 2],
+        spread: Spread,
+        parts: Vec<(Vec<[f32; 3]>, Option<Vec<f32>>)>,
+    ) -> Self {
         let pixels = size[0] * size[1];
         assert!(parts.len() >= 2, "one picture has no spread");
         let part = |(means, counts): (Vec<[f32; 3]>, Option<Vec<f32>>)| {
@@ -237,7 +242,8 @@ fn whole(name: &str, picture: &Picture) -> Result<Part> {
 }
 
 fn digits(picture: &Picture) -> f32 {
-    let half = picture.planes.iter().any(|p| p.kind == SampleKind::Half && ["R", "Y"].contains(&p.name.as_str()));
+    let half =
+        picture.planes.iter().any(|p| p.kind == SampleKind::Half && ["R", "Y"].contains(&p.name.as_str()));
     // Eleven significant bits of a half.
     if half { 1.0 / 1024.0 } else { f32::EPSILON }
 }

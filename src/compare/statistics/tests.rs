@@ -100,23 +100,33 @@ fn experiment() {
     for noise in [Noise::Normal, Noise::Skewed, Noise::Firefly] {
         for colour in [Colour::Grey, Colour::Mixed] {
             for spp in [[16, 16], [8, 64]] {
-            let n: u64 = 4000;
-            let all: Vec<(f64, f64, Vec<f64>)> = (0..n)
-                .into_par_iter()
-                .map(|i| {
-                    let [a, b] = [0, 1].map(|k| picture(2 * i + k + 1000 * spp[0] as u64, spp[k as usize], noise, colour));
-                    let r = ask(&a, &b);
-                    (r.p.unwrap(), r.whole.p.unwrap(), r.tiles.iter().filter_map(|t| t.p).collect())
-                })
-                .collect();
-            let rate = |f: &dyn Fn(&(f64, f64, Vec<f64>)) -> bool| all.iter().filter(|a| f(a)).count() as f64 / n as f64;
-            let tiles: Vec<f64> = all.iter().flat_map(|a| a.2.clone()).collect();
-            let u = families::uniformity(&tiles).unwrap();
-            println!("{noise:?} {colour:?} {spp:?}: verdict 1% {:.4} 5% {:.4}; whole {:.4}; simes {:.4}, tiles<.01 {:.4} <.001 {:.5} KS d {:.4} p {:.1e}",
-                rate(&|a| a.0 <= 0.01), rate(&|a| a.0 <= 0.05), rate(&|a| a.1 <= 0.01), rate(&|a| families::simes(&a.2) <= 0.01),
-                tiles.iter().filter(|p| **p <= 0.01).count() as f64 / tiles.len() as f64,
-                tiles.iter().filter(|p| **p <= 0.001).count() as f64 / tiles.len() as f64,
-                u.distance, u.p);
+                let n: u64 = 4000;
+                let all: Vec<(f64, f64, Vec<f64>)> = (0..n)
+                    .into_par_iter()
+                    .map(|i| {
+                        let [a, b] = [0, 1].map(|k| {
+                            picture(2 * i + k + 1000 * spp[0] as u64, spp[k as usize], noise, colour)
+                        });
+                        let r = ask(&a, &b);
+                        (r.p.unwrap(), r.whole.p.unwrap(), r.tiles.iter().filter_map(|t| t.p).collect())
+                    })
+                    .collect();
+                let rate = |f: &dyn Fn(&(f64, f64, Vec<f64>)) -> bool| {
+                    all.iter().filter(|a| f(a)).count() as f64 / n as f64
+                };
+                let tiles: Vec<f64> = all.iter().flat_map(|a| a.2.clone()).collect();
+                let u = families::uniformity(&tiles).unwrap();
+                println!(
+                    "{noise:?} {colour:?} {spp:?}: verdict 1% {:.4} 5% {:.4}; whole {:.4}; simes {:.4}, tiles<.01 {:.4} <.001 {:.5} KS d {:.4} p {:.1e}",
+                    rate(&|a| a.0 <= 0.01),
+                    rate(&|a| a.0 <= 0.05),
+                    rate(&|a| a.1 <= 0.01),
+                    rate(&|a| families::simes(&a.2) <= 0.01),
+                    tiles.iter().filter(|p| **p <= 0.01).count() as f64 / tiles.len() as f64,
+                    tiles.iter().filter(|p| **p <= 0.001).count() as f64 / tiles.len() as f64,
+                    u.distance,
+                    u.p
+                );
             }
         }
     }

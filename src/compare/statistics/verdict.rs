@@ -64,7 +64,8 @@ pub fn sentence(r: &StatisticalResult) -> String {
     let text = match r.outcome {
         Outcome::Identical => "the same: both have the same bits in every pixel and replicate".into(),
         Outcome::Same => {
-            "the same but for rounding: no pixel has noise, and none differs by more than rounding explains".into()
+            "the same but for rounding: no pixel has noise, and none differs by more than rounding explains"
+                .into()
         }
         Outcome::NoDifference => nothing(r),
         Outcome::Different => different(r),
