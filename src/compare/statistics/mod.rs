@@ -43,8 +43,6 @@ pub mod present;
 pub mod region;
 pub mod replicates;
 pub mod results;
-#[cfg(test)]
-mod tests;
 pub mod verdict;
 
 use crate::error::{Error, Result};

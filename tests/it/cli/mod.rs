@@ -5,6 +5,7 @@ mod bench;
 mod bench_error;
 mod crosscheck;
 mod denoise;
+mod equivalent;
 mod folder;
 #[cfg(target_os = "linux")]
 mod memory;
