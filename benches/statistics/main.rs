@@ -129,8 +129,8 @@ fn rates(pairs: usize, wanted: &dyn Fn(&str) -> bool) -> Vec<Rate> {
                 let name = format!("rate {noise:?} {colour:?}").to_lowercase();
                 if wanted(&format!("{name} {} {}", spp[0], spp[1])) {
                     let make = |k: usize, seed: u64| noise::picture(SIDE, seed, spp[k], noise, colour);
-                    // A firefly that few pixels have: careful, and with unlike numbers of samples more than that.
-                    let exact = noise == Noise::Normal || spp[0] == spp[1];
+                    // Tiles with few fireflies are judged with care, and so is noise that is borrowed.
+                    let exact = noise != Noise::Firefly && spp[0] == spp[1];
                     all.push(rate(name, spp, pairs, exact, &make));
                 }
             }

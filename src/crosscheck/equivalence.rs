@@ -13,12 +13,12 @@
 //! allowed to begin; what a round brings does not depend on it.
 
 use super::compare::{Contender, Shared};
+use super::pictures::plain;
 use crate::compare::statistics::equivalence::{Answer, Equivalence, Levels, ask};
 use crate::compare::statistics::pair::{Design, LUMINANCE, Pair};
 use crate::compare::statistics::replicates::{Origin, Replicates};
 use crate::error::{Error, Result};
 use crate::integrators::Integrator;
-use crate::render::dealing::Dealing;
 use crate::render::film::Film;
 use crate::render::settings::RenderSettings;
 use crate::render::{Progress, Renderer};
@@ -137,19 +137,13 @@ fn render(
         } else {
             mix64(plan.settings.seed ^ mix64(u64::from(round) | own))
         },
-        // Every pixel by samples, the same for all kernels, and independent of its neighbours.
+        // Pixels are independent of their neighbours, so that the error of the mean is known.
         moments: true,
         sampler: match plan.settings.sampler {
             Sampler::ZSobol => Sampler::OwenSobol,
             sampler => sampler,
         },
-        skip_background: false,
-        pilot: false,
-        outlines: Some(1),
-        dealing: Dealing::Even,
-        time: None,
-        target: None,
-        ..plan.settings.clone()
+        ..plain(&plan.settings)
     };
     let shared = Box::new(Shared(plan.contenders[kernel].kernel.clone()));
     let usual = std::mem::replace(&mut scene.kernel, shared);

@@ -15,7 +15,7 @@ use scenes::{Bias, CASES, Prepared};
 use skylit::compare::statistics::equivalence::Answer;
 use skylit::compare::statistics::families::uniformity;
 use skylit::compare::statistics::pair::{Design, Reason};
-use skylit::compare::statistics::replicates::{Origin, Replicates, Spread};
+use skylit::compare::statistics::replicates::{Origin, Replicates, Spread, Values};
 use skylit::compare::statistics::{Outcome, Place, Question, Region, StatisticalResult, compare};
 use skylit::image::picture::{Picture, SampleKind};
 use skylit::image::read::read_planes;
@@ -80,7 +80,7 @@ fn renders_of_two_seeds_are_the_same_but_for_chance() {
 fn more_samples_in_one_picture_raise_no_alarm() {
     const PAIRS: u64 = 150;
     for (noise, colour) in [(Noise::Skewed, Colour::Grey), (Noise::Firefly, Colour::Mixed)] {
-        let make = |seed: u64| picture(48, seed, if seed % 2 == 0 { 16 } else { 64 }, noise, colour);
+        let make = |seed: u64| picture(48, seed, if seed.is_multiple_of(2) { 16 } else { 64 }, noise, colour);
         let (different, _) = alarms(PAIRS, &make, &loosely());
         assert!(is_likely(PAIRS as usize, different, 0.2, false), "{noise:?}: {different}");
     }
@@ -151,11 +151,21 @@ fn what_has_no_noise_is_exact() {
     assert_eq!(r.tiles.iter().filter(|t| t.exact).count(), 6);
     let map = r.map();
     assert!(map[0] != 0.0 && map[48 * 40] == 0.0);
-    // A tint of grey noise: no noise of hue, so that any is exact.
+    // A tint of grey noise: there is hardly any noise of hue that could explain it.
     let grey = |seed| picture(48, seed, 16, Noise::Normal, Colour::Grey);
+    assert_eq!(ask(&grey(1), &grey(2)).whole.rank, 1);
     let tinted = grey(2).scaled([1.0, 1.0, 1.001], |i| i >= 48 * 16);
     let r = ask(&grey(1), &tinted);
-    assert_eq!((r.outcome, r.whole.exact, r.whole.rank), (Outcome::Different, true, 1));
+    assert!(r.outcome == Outcome::Different && r.p.is_some_and(|p| p < 1e-10), "{}", r.sentence);
+    // And where there is none at all: light is added, of which the noise does not know.
+    let mut parts: Vec<Values> = Vec::new();
+    for half in 0..2 {
+        let noisy = grey(2);
+        let value = |i: usize| noisy.value(half, i).0.map(|v| v as f32);
+        parts.push(((0..48 * 48).map(value).map(|[r, g, b]| [r, g, b + 0.01]).collect(), None));
+    }
+    let r = ask(&grey(1), &Replicates::of_values([48, 48], Spread::Pixels, parts));
+    assert!(r.outcome == Outcome::Different && r.whole.exact, "{}", r.sentence);
 }
 
 /// Pictures of another program, which has a filter as wide as the picture: pixels are not independent.

@@ -255,10 +255,8 @@ fn first_sums(pair: &Pair, pixels: &[u32], pictures: [bool; 2]) -> Sums {
             sums.quiet += 1;
             continue;
         }
-        for c in 0..3 {
-            sums.difference[c] += difference[c];
-            sums.rounding[c] += visit.tolerance[c] * visit.tolerance[c];
-        }
+        (0..3).for_each(|c| sums.difference[c] += difference[c]);
+        (0..3).for_each(|c| sums.rounding[c] += visit.tolerance[c] * visit.tolerance[c]);
         for item in items.iter().filter(|i| !pictures[usize::from(i.of_test)]) {
             add_outer(&mut sums.covariance[usize::from(item.of_test)], item.value, 1.0);
         }
