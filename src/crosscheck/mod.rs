@@ -8,6 +8,7 @@
 
 pub mod compare;
 pub mod crossing;
+pub mod equivalence;
 pub mod html;
 pub mod judge;
 pub mod leaf_ray;
@@ -40,6 +41,7 @@ use std::sync::{Arc, Mutex};
 use tally::Tally;
 
 /// What is to be compared.
+#[derive(Clone)]
 pub struct Plan {
     /// At least one kernel, each over the geometry of the scene. The first decides which rays there are.
     pub contenders: Vec<Contender>,
@@ -127,6 +129,8 @@ pub fn run(scene: &mut Scene, plan: &Plan, progress: &dyn Progress) -> Result<Cr
     if plan.contenders.is_empty() {
         return Err(Error::Usage("there is no kernel to check".into()));
     }
+    // Of the first kernel's picture, too: points depend on how samples are dealt.
+    let plan = &Plan { settings: pictures::plain(&plan.settings), ..plan.clone() };
     let threads = plan.settings.threads.max(1);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|e| Error::Internal(format!("cannot start {threads} threads: {e}")))?;

@@ -4,6 +4,7 @@ use super::Plan;
 use crate::error::Result;
 use crate::render::dealing::Dealing;
 use crate::render::film::Film;
+use crate::render::settings::RenderSettings;
 use crate::render::{Progress, Renderer};
 use crate::scene::Scene;
 use std::collections::HashSet;
@@ -71,14 +72,22 @@ pub fn differing(a: &Film, b: &Film, marked: &HashSet<[u32; 2]>) -> (Vec<[u32; 2
     (differing, unexplained)
 }
 
+/// Settings under which every sample has the rays that are compared, by the integrator as it is, whoever renders it.
+pub fn plain(settings: &RenderSettings) -> RenderSettings {
+    RenderSettings {
+        skip_background: false,
+        pilot: false,
+        outlines: Some(1),
+        dealing: Dealing::Even,
+        time: None,
+        target: None,
+        ..settings.clone()
+    }
+}
+
 /// The picture by the scene's present kernel.
 pub(super) fn render(scene: &Scene, plan: &Plan, progress: &dyn Progress) -> Result<Film> {
-    let mut settings = plan.settings.clone();
-    settings.time = None;
-    // Every sample has the rays that were compared, by the integrator as it is.
-    (settings.skip_background, settings.pilot, settings.outlines) = (false, false, Some(1));
-    settings.dealing = Dealing::Even;
-    let renderer = Renderer { integrator: Arc::clone(&plan.integrator), settings };
+    let renderer = Renderer { integrator: Arc::clone(&plan.integrator), settings: plain(&plan.settings) };
     Ok(renderer.render(scene, &Onward(progress))?.film)
 }
 

@@ -26,6 +26,7 @@ mod product;
 mod reference;
 mod seeds;
 mod source;
+mod statistics;
 mod unbiased;
 mod unneeded;
 mod vertices;

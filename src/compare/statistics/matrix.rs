@@ -56,9 +56,7 @@ pub fn eigen(m: &Mat) -> [Eigen; 3] {
             for row in &mut a {
                 [row[p], row[q]] = rotate(row[p], row[q]);
             }
-            for k in 0..3 {
-                [a[p][k], a[q][k]] = rotate(a[p][k], a[q][k]);
-            }
+            (0..3).for_each(|k| [a[p][k], a[q][k]] = rotate(a[p][k], a[q][k]));
             (a[p][q], a[q][p]) = (0.0, 0.0);
             for row in &mut v {
                 [row[p], row[q]] = rotate(row[p], row[q]);

@@ -11,10 +11,10 @@ pub const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 /// Half of the film's step (see [`crate::render::fixed`]), and as much again: what values below it round to is chance.
 const STEP: f64 = 1.2e-7;
 
-/// Spreads of two pictures go together if their covariance is so many standard errors above 0 ...
+/// Spreads of two pictures go together if pixels in which they have the same sign exceed the others by so many deviations ...
 const DEPENDENT_DEVIATES: f64 = 8.0;
-/// ... and their correlation is so large.
-const DEPENDENT_CORRELATION: f64 = 0.05;
+/// ... and by such a share of all.
+const DEPENDENT_SHARE: f64 = 0.05;
 
 /// What is random in what.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -124,29 +124,28 @@ impl<'a> Pair<'a> {
         a.seed.is_some() && a.seed == b.seed
     }
 
-    /// Whether the spreads of both go together. Replicates of independent pictures are as often
-    /// off to the same side as to opposite ones, so that the sum of products has expectation 0, and its variance is about
-    /// the sum of their squares.
+    /// Whether the spreads of both go together. Replicates of independent pictures are as often off to the same side as to
+    /// opposite ones, whatever their distribution: a fair coin for each pixel.
     fn share_noise(&self) -> bool {
-        let (mut products, mut squares, mut a2, mut b2) = (0.0, 0.0, 0.0, 0.0);
+        let (mut together, mut all) = (0.0f64, 0.0f64);
         let [mut a, mut b] = [Vec::new(), Vec::new()];
         for pixel in 0..self.pixels() {
-            (a.clear(), b.clear());
+            a.clear();
+            b.clear();
             if spread(self.reference, pixel, false, &mut a).is_none()
                 || spread(self.test, pixel, true, &mut b).is_none()
             {
                 continue;
             }
             for (a, b) in a.iter().zip(&b) {
-                let [x, y] = [dot(LUMINANCE, a.value), dot(LUMINANCE, b.value)];
-                if x.is_finite() && y.is_finite() {
-                    products += x * y;
-                    squares += (x * y).powi(2);
-                    (a2, b2) = (a2 + x * x, b2 + y * y);
+                let product = dot(LUMINANCE, a.value) * dot(LUMINANCE, b.value);
+                if product.is_finite() && product != 0.0 {
+                    together += product.signum();
+                    all += 1.0;
                 }
             }
         }
-        products > DEPENDENT_DEVIATES * squares.sqrt() && products > DEPENDENT_CORRELATION * (a2 * b2).sqrt()
+        together > DEPENDENT_DEVIATES * all.sqrt() && together > DEPENDENT_SHARE * all
     }
 
     /// How many pixels.

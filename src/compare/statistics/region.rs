@@ -23,16 +23,14 @@
 //! q_i <= 1 and sum q_i = p, f is p at least, where p pixels have all the noise. Heavy tails raise the sum of q_i^2, and so
 //! lower f: a pixel that outweighs all others is not taken for a significant one.
 
-use super::matrix::{Mat, add_outer, dot, eigen, quadratic};
-use super::pair::{Design, Item, LUMINANCE, Pair, Running, Use};
-use super::replicates::Spread;
+use super::lens::{CONTRASTS, Lens, freedom};
+use super::matrix::{Mat, add_outer, dot, quadratic};
+use super::pair::{Design, Item, Pair, Running, Use};
+use super::replicates::{Replicates, Spread};
 use rayon::prelude::*;
 
 /// Pixels that are summed in one go; sums of such runs are added in order.
 const RUN: usize = 4096;
-
-/// Variances below this part of the squared tolerance of rounding are none.
-const ROUNDING: f64 = 1.0 / 16.0;
 
 /// From so many degrees of freedom of whole pictures on, their channels are looked at together; below, luminance alone.
 const JOINT_FREEDOM: f64 = 8.0;
@@ -43,10 +41,6 @@ pub const STILL: usize = 16;
 
 /// Numbers of samples are unlike if they differ by this factor.
 const UNLIKE: f64 = 1.5;
-
-/// The noise of the picture with fewer samples is borrowed if its own is less than the other foretells by this factor:
-/// chance alone hardly brings that where there are a few dozen pixels with noise.
-const MISSED: f64 = 2.0;
 
 /// A difference with its error along one mixture of channels.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -86,7 +80,7 @@ pub struct Finding {
     pub contrasts: [Contrast; 4],
     /// Squared length, in units of the noise, of the reference's sum: what a bias of 100 % in all channels would bring.
     pub strength: f64,
-    /// Whether the picture with fewer samples was given the noise that the other foretells.
+    /// Whether the picture with fewer samples was given, along some mixture of channels, the noise that the other foretells.
     pub borrowed: bool,
 }
 
@@ -143,17 +137,6 @@ impl Sums {
     }
 }
 
-/// How covariances and fourth moments are read.
-struct Lens {
-    /// What a side's items count: the square root of this multiplies them.
-    weights: [f64; 2],
-    /// Rows that make noise round: p of them.
-    white: Vec<[f64; 3]>,
-    /// Unit vectors, in scaled channels, of the directions without noise.
-    dropped: Vec<[f64; 3]>,
-    scale: [f64; 3],
-}
-
 /// Second sums.
 #[derive(Debug, Clone, Copy, Default)]
 struct Fourths {
@@ -163,24 +146,17 @@ struct Fourths {
     largest_still: f64,
 }
 
-const CONTRASTS: [[f64; 3]; 4] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], LUMINANCE];
-
 /// Tests the pixels of these numbers.
 pub fn examine(pair: &Pair, pixels: &[u32]) -> Finding {
     let sides = by_side(pair);
     let sums = in_order(pixels, |run| first_sums(pair, run, sides), Sums::default(), |a, b| a.add(b));
-    let whole = picture_items(pair, &sums, sides);
+    let whole = picture_items(&sums, sides);
     let mut sums = sums;
     for (item, _) in &whole {
         add_outer(&mut sums.covariance[usize::from(item.of_test)], item.value, 1.0);
     }
-    let (weights, borrowed) = weights(pair, &sums);
-    let mut v: Mat = [[0.0; 3]; 3];
-    for (side, weight) in weights.into_iter().enumerate() {
-        (0..9).for_each(|i| v[i / 3][i % 3] += weight * sums.covariance[side][i / 3][i % 3]);
-    }
     let joint = whole.is_empty() || picture_freedom(pair, sides) >= JOINT_FREEDOM;
-    let lens = Lens::new(&v, &sums.rounding, weights, joint);
+    let lens = Lens::new(&sums.covariance, &sums.rounding, ratio(pair), joint);
     let fourths = in_order(
         pixels,
         |run| second_sums(pair, run, sides, &lens),
@@ -193,10 +169,12 @@ pub fn examine(pair: &Pair, pixels: &[u32]) -> Finding {
         },
     );
     let rank = lens.white.len();
-    let freedom = freedom(&lens.white, rank, fourths.q2, &whole, &lens);
+    let of_all = freedom(&lens.white, &lens.counts, fourths.q2, &whole);
     let contrast = |k: usize| {
         let along = CONTRASTS[k];
-        let variance = quadratic(&v, along).max(0.0);
+        let sides = sums.covariance.map(|m| quadratic(&m, along).max(0.0));
+        let counts = lens.contrast_counts[k];
+        let variance: f64 = (0..2).map(|side| sides[side] * counts[side] * counts[side]).sum();
         // The same formula for one direction.
         let white = [along.map(|c| c / variance.sqrt())];
         let fourth = fourths.contrasts[k] / (variance * variance);
@@ -204,7 +182,7 @@ pub fn examine(pair: &Pair, pixels: &[u32]) -> Finding {
             reference: dot(along, sums.reference),
             difference: dot(along, sums.difference),
             error: variance.sqrt(),
-            freedom: if variance > 0.0 { self::freedom(&white, 1, fourth, &whole, &lens) } else { 1.0 },
+            freedom: if variance > 0.0 { freedom(&white, &[counts], fourth, &whole) } else { 1.0 },
         }
     };
     let length2 = |v: [f64; 3]| lens.white.iter().map(|w| dot(*w, v).powi(2)).sum::<f64>();
@@ -217,10 +195,10 @@ pub fn examine(pair: &Pair, pixels: &[u32]) -> Finding {
         largest_still: fourths.largest_still,
         rank,
         t2: length2(sums.difference),
-        freedom,
+        freedom: of_all,
         contrasts: [0, 1, 2, 3].map(contrast),
         strength: length2(sums.reference),
-        borrowed,
+        borrowed: lens.counts.iter().flatten().any(|c| *c == 0.0),
     }
 }
 
@@ -277,10 +255,8 @@ fn first_sums(pair: &Pair, pixels: &[u32], pictures: [bool; 2]) -> Sums {
             sums.quiet += 1;
             continue;
         }
-        for c in 0..3 {
-            sums.difference[c] += difference[c];
-            sums.rounding[c] += visit.tolerance[c] * visit.tolerance[c];
-        }
+        (0..3).for_each(|c| sums.difference[c] += difference[c]);
+        (0..3).for_each(|c| sums.rounding[c] += visit.tolerance[c] * visit.tolerance[c]);
         for item in items.iter().filter(|i| !pictures[usize::from(i.of_test)]) {
             add_outer(&mut sums.covariance[usize::from(item.of_test)], item.value, 1.0);
         }
@@ -295,7 +271,7 @@ fn first_sums(pair: &Pair, pixels: &[u32], pictures: [bool; 2]) -> Sums {
 }
 
 /// The items of sides that are known by whole pictures, each with the number of its like.
-fn picture_items(pair: &Pair, sums: &Sums, pictures: [bool; 2]) -> Vec<(Item, f64)> {
+fn picture_items(sums: &Sums, pictures: [bool; 2]) -> Vec<(Item, f64)> {
     let mut all = Vec::new();
     for side in (0..2).filter(|side| pictures[*side]) {
         let (mut running, mut items) = (Running::default(), Vec::new());
@@ -309,7 +285,6 @@ fn picture_items(pair: &Pair, sums: &Sums, pictures: [bool; 2]) -> Vec<(Item, f6
             all.extend(items.into_iter().map(|i| (i, n)));
         }
     }
-    debug_assert!(pair.pixels() > 0);
     all
 }
 
@@ -318,53 +293,12 @@ fn picture_freedom(pair: &Pair, pictures: [bool; 2]) -> f64 {
     (0..2).filter(|side| pictures[*side]).map(|side| of[side].len() as f64 - 1.0).sum()
 }
 
-/// What the covariances of the two sides count. Where one picture has far fewer samples, its noise is at least what the other's
-/// foretells: that of samples alike falls as 1 / n or faster. Its own estimate may have missed what is rare, and would then
-/// make the other's rare finds look significant.
-fn weights(pair: &Pair, sums: &Sums) -> ([f64; 2], bool) {
-    let known =
-        [pair.reference, pair.test].map(|r| if r.spread == Spread::Pixels { r.samples() } else { None });
-    let (Design::Independent, [Some(m), Some(n)]) = (pair.design, known) else { return ([1.0; 2], false) };
-    let variance = sums.covariance.map(|v| quadratic(&v, LUMINANCE));
-    match n / m {
-        ratio if ratio >= UNLIKE && ratio * variance[1] > MISSED * variance[0] => ([0.0, 1.0 + ratio], true),
-        ratio if ratio * UNLIKE <= 1.0 && variance[0] > MISSED * ratio * variance[1] => {
-            ([1.0 + 1.0 / ratio, 0.0], true)
-        }
-        _ => ([1.0; 2], false),
-    }
-}
-
-impl Lens {
-    fn new(v: &Mat, rounding: &[f64; 3], weights: [f64; 2], joint: bool) -> Self {
-        let scale = rounding.map(|r| (ROUNDING * r).sqrt().max(1e-100));
-        let mut lens = Lens { weights, white: Vec::new(), dropped: Vec::new(), scale };
-        if !joint {
-            let variance = quadratic(v, LUMINANCE);
-            if variance > 0.0 {
-                lens.white.push(LUMINANCE.map(|c| c / variance.sqrt()));
-            }
-            return lens;
-        }
-        let mut scaled = *v;
-        (0..9).for_each(|i| scaled[i / 3][i % 3] /= scale[i / 3] * scale[i % 3]);
-        for e in eigen(&scaled) {
-            if e.value >= 1.0 && e.value.is_finite() {
-                let root = e.value.sqrt();
-                lens.white.push([0, 1, 2].map(|c| e.vector[c] / (scale[c] * root)));
-            } else {
-                lens.dropped.push(e.vector);
-            }
-        }
-        lens
-    }
-
-    /// Whether a difference reaches, beyond rounding, into directions without noise.
-    fn leaves(&self, difference: [f64; 3], tolerance: [f64; 3]) -> bool {
-        let along = |u: &[f64; 3], v: [f64; 3]| (0..3).map(|c| u[c] * v[c] / self.scale[c]).sum::<f64>();
-        let most = |u: &[f64; 3]| (0..3).map(|c| u[c].abs() * tolerance[c] / self.scale[c]).sum::<f64>();
-        self.dropped.iter().any(|u| along(u, difference).abs() > 2.0 * most(u))
-    }
+/// How many times the reference's samples the test has, where both are known and unlike.
+fn ratio(pair: &Pair) -> Option<f64> {
+    let samples = |r: &Replicates| if r.spread == Spread::Pixels { r.samples() } else { None };
+    let (m, n) = (samples(pair.reference)?, samples(pair.test)?);
+    let unlike = m.max(n) >= UNLIKE * m.min(n);
+    (pair.design == Design::Independent && unlike).then_some(n / m)
 }
 
 fn second_sums(pair: &Pair, pixels: &[u32], pictures: [bool; 2], lens: &Lens) -> Fourths {
@@ -381,41 +315,14 @@ fn second_sums(pair: &Pair, pixels: &[u32], pictures: [bool; 2], lens: &Lens) ->
             sums.largest_still = sums.largest_still.max(largest);
         }
         for item in items.iter().filter(|i| !pictures[usize::from(i.of_test)]) {
-            let weight = lens.weights[usize::from(item.of_test)];
-            let q: f64 = lens.white.iter().map(|w| dot(*w, item.value).powi(2)).sum();
-            sums.q2 += (weight * q).powi(2);
-            for (sum, along) in sums.contrasts.iter_mut().zip(CONTRASTS) {
-                *sum += (weight * dot(along, item.value).powi(2)).powi(2);
+            let side = usize::from(item.of_test);
+            let rows = lens.white.iter().zip(&lens.counts);
+            let q: f64 = rows.map(|(w, count)| (count[side] * dot(*w, item.value)).powi(2)).sum();
+            sums.q2 += q * q;
+            for (k, along) in CONTRASTS.into_iter().enumerate() {
+                sums.contrasts[k] += (lens.contrast_counts[k][side] * dot(along, item.value)).powi(4);
             }
         }
     }
     sums
-}
-
-/// See the module: `q2` is the sum over the pixels' items. Items of whole pictures are alike, so that their side's f is known:
-/// it adds tr(O^2) + (tr O)^2 over its number to the denominator.
-fn freedom(white: &[[f64; 3]], rank: usize, q2: f64, whole: &[(Item, f64)], lens: &Lens) -> f64 {
-    if rank == 0 {
-        return 0.0;
-    }
-    let p = rank as f64;
-    if whole.is_empty() {
-        return (p * (p + 2.0) / q2 - 2.0).max(p);
-    }
-    let mut below = q2 * (p + 1.0) / (p + 2.0);
-    for side in [false, true] {
-        let mine: Vec<_> = whole.iter().filter(|(i, _)| i.of_test == side).collect();
-        let Some((_, n)) = mine.first() else { continue };
-        let weight = lens.weights[usize::from(side)];
-        // O in white coordinates.
-        let mut o = vec![vec![0.0; rank]; rank];
-        for (item, _) in &mine {
-            let z: Vec<f64> = white.iter().map(|w| dot(*w, item.value)).collect();
-            (0..rank * rank).for_each(|i| o[i / rank][i % rank] += weight * z[i / rank] * z[i % rank]);
-        }
-        let trace: f64 = (0..rank).map(|i| o[i][i]).sum();
-        let squares: f64 = o.iter().flatten().map(|v| v * v).sum();
-        below += (squares + trace * trace) / n;
-    }
-    ((p + p * p) / below).max(p)
 }

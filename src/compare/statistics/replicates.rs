@@ -35,6 +35,9 @@ struct Part {
     counts: Option<Vec<f32>>,
 }
 
+/// Means of the pixels, and their numbers of samples where these are not all alike.
+pub type Values = (Vec<[f32; 3]>, Option<Vec<f32>>);
+
 /// Replicates of a picture: at least two.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Replicates {
@@ -204,14 +207,10 @@ impl Replicates {
     ///
     /// # Panics
     /// If there are less than two, or lengths are not that of the size.
-    pub fn of_values(
-        size: [usize; 2],
-        spread: Spread,
-        parts: Vec<(Vec<[f32; 3]>, Option<Vec<f32>>)>,
-    ) -> Self {
+    pub fn of_values(size: [usize; 2], spread: Spread, parts: Vec<Values>) -> Self {
         let pixels = size[0] * size[1];
         assert!(parts.len() >= 2, "one picture has no spread");
-        let part = |(means, counts): (Vec<[f32; 3]>, Option<Vec<f32>>)| {
+        let part = |(means, counts): Values| {
             assert!(means.len() == pixels && counts.as_ref().is_none_or(|c| c.len() == pixels));
             Part { means, counts }
         };

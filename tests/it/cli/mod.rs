@@ -7,6 +7,7 @@ mod compare;
 mod convert;
 mod crosscheck;
 mod denoise;
+mod equivalent;
 mod folder;
 #[cfg(target_os = "linux")]
 mod memory;
