@@ -121,8 +121,9 @@ fn in_colours(
         return Err(Error::Usage("--log wants a --range of positive numbers".into()));
     }
     if !setting.quiet {
+        let why = if args.range.is_none() { " (its 1 % and 99 % quantiles)" } else { "" };
         let how = if args.log { ", by ratios" } else { "" };
-        eprintln!("{what} from {} to {}{how}, in {scale}", range.low, range.high);
+        eprintln!("{what} from {} to {}{why}{how}, in {scale}", range.low, range.high);
     }
     let nan = values.iter().filter(|v| v.is_nan()).count();
     if nan > 0 {

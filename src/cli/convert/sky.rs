@@ -21,7 +21,7 @@ const MOST: usize = 8_192;
 const BYTES: usize = 64;
 
 enum Sky {
-    Cube([ImageData; 6]),
+    Cube(Box<[ImageData; 6]>),
     Equirectangular(ImageData),
 }
 
@@ -40,7 +40,7 @@ pub fn run(input: &Path, output: &Path, layout: Layout, args: &PictureArgs) -> R
                     let _room = room(output, 6 * size * size)?;
                     cube_of(&sky, size)
                 }
-                (Sky::Cube(faces), None) => faces,
+                (Sky::Cube(faces), None) => *faces,
                 (Sky::Cube(_), Some(_)) => return Err(already(input, "a cube")),
             };
             std::fs::create_dir_all(output).map_err(|e| Error::file(output, "create", e))?;
@@ -81,7 +81,7 @@ fn read(input: &Path, args: &PictureArgs) -> Result<Sky> {
             return Ok(Sky::Equirectangular(image));
         }
     }
-    files.faces(args.encoding()).map(Sky::Cube)
+    files.faces(args.encoding()).map(|faces| Sky::Cube(Box::new(faces)))
 }
 
 /// The six files to write, of the kind of the input where that holds radiance, else EXR.

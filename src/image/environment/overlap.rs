@@ -154,8 +154,7 @@ impl Overlap {
 
     /// Lines t = c: away from the middle they fall.
     fn side_lines(&self, [a, b]: [f64; 2], ends: [&[End]; 2], put: &mut impl FnMut(usize, usize, f64)) {
-        for k in 1..self.lines.len() {
-            let (from, to) = (ends[0][k], ends[1][k]);
+        for (k, (&from, &to)) in ends[0].iter().zip(ends[1]).enumerate().skip(1) {
             let mut done = from.integral;
             let mut piece = |row: usize, upto: f64| {
                 put(k - 1, row, upto - done);

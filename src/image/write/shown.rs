@@ -1,7 +1,7 @@
 //! Formats that hold what a display shows: PNG, JPEG, and TIFF of whole numbers.
 
 use super::{WriteOptions, colour_planes};
-use crate::color::{Rgb, Transfer, linear_to_srgb};
+use crate::color::{Rgb, Transfer};
 use crate::image::picture::Picture;
 use crate::image::srgb8;
 use crate::image::tonemap::Look;
@@ -47,8 +47,11 @@ impl Sample for u16 {
         (v * Self::MOST).round() as u16
     }
 
+    /// In double precision: the curve's rounding in single precision is a few thousandths of a step.
     fn srgb(v: f32) -> Self {
-        Self::rounded(linear_to_srgb(v))
+        let v = f64::from(v).clamp(0.0, 1.0);
+        let encoded = if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
+        (encoded * 65535.0).round() as u16
     }
 }
 

@@ -300,7 +300,7 @@ fn sixteen_bits_of_png_and_tiff_are_the_nearest() {
         let (_, back) = written(name, &picture, &options);
         assert_eq!(back.stored, Stored::Integer { bits, encoding: Default::default() });
         for (i, (was, is)) in ramp.iter().zip(&back.picture.plane("G").expect("green").data).enumerate() {
-            // Half a step, and the curve there and back in f32.
+            // Half a step, and the curve to linear values in f32.
             assert!((was - is).abs() <= 0.5 / most + 1e-6, "{name} {bits} {i}: {was} {is}");
         }
         assert!(back.picture.plane("A").expect("alpha").data.iter().all(|a| *a == 1.0));

@@ -160,11 +160,13 @@ fn bad_conversions_leave_nothing_behind() {
     f.refuses("convert a.exr b.png --compat exact", 2, &["--compat is for scenes"]);
     f.refuses("convert scene.toml b.toml --exposure 1", 2, &["--exposure is for pictures"]);
     f.refuses("convert a.exr", 2, &["required"]);
-    f.refuses("convert a.exr faces --to cube", 2, &["4x2"]);
+    let odd = Picture { planes: sample().planes[..3].to_vec(), ..Picture::new(8, 1) };
+    write_picture(&f.path().join("odd.hdr"), &odd, &WriteOptions::default()).unwrap();
+    f.refuses("convert odd.hdr faces --to cube", 2, &["is 8x1; a sky is"]);
     f.refuses("convert a.exr b.exr --to cub", 2, &["cube", "equirectangular"]);
     f.refuses("convert a.exr faces --to cube --size 0", 2, &["--size 0"]);
     let mut after = f.names();
-    after.retain(|n| n != "cut.exr" && n != "empty.png");
+    after.retain(|n| !["cut.exr", "empty.png", "odd.hdr"].contains(&&**n));
     assert_eq!(after, before);
 }
 
@@ -200,4 +202,47 @@ fn skies_go_to_a_cube_and_back() {
     f.refuses("convert faces b.exr --to cube --size 9", 2, &["is a cube already"]);
     write_picture(&f.path().join("faces/other.png"), &sky, &WriteOptions::default()).unwrap();
     f.refuses("convert sky.pfm faces --to cube", 2, &["other.png", "taken for a face"]);
+}
+
+#[test]
+fn a_sky_looks_the_same_in_every_direction_from_either_layout() {
+    let f = Folder::new();
+    // Each direction has its own colour: x is red, y green, z blue.
+    let (w, h) = (128, 64);
+    let direction = |i: usize| {
+        let (x, y) = ((i % w) as f64 + 0.5, (i / w) as f64 + 0.5);
+        let latitude = std::f64::consts::PI * (0.5 - y / h as f64);
+        let longitude = std::f64::consts::TAU * (x / w as f64 - 0.5);
+        [latitude.cos() * longitude.cos(), latitude.sin(), latitude.cos() * longitude.sin()]
+    };
+    let mut sky = Picture::new(w, h);
+    for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
+        let data = (0..w * h).map(|i| (0.5 + 0.5 * direction(i)[c]) as f32).collect();
+        sky.push(name, SampleKind::Float, data);
+    }
+    write_picture(&f.path().join("sky.exr"), &sky, &WriteOptions::default()).unwrap();
+    f.run("convert sky.exr faces --to cube").succeeds();
+    f.run("convert faces back.exr --to equirectangular").succeeds();
+    let skies = [("sphere", "sky.exr"), ("cube", "faces"), ("sphere", "back.exr")];
+    let views = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1], [1, 1, 1], [-1, -1, 1]];
+    for to in views {
+        let up = if to[0] == 0 && to[2] == 0 { [0, 0, 1] } else { [0, 1, 0] };
+        let seen = skies.map(|(kind, path)| {
+            let scene = format!(
+                "[film]\nsize = [12, 12]\n[camera]\ntype = \"perspective\"\neye = [0, 0, 0]\nlook_at = {to:?}\n\
+                 up = {up:?}\nfov_deg = 90\n[sky]\ntype = \"{kind}\"\npath = \"{path}\"\n[materials.clay]\n\
+                 type = \"diffuse\"\n[[objects]]\nshape = {{ type = \"sphere\", center = [900, 900, -900], \
+                 radius = 0.01 }}\nmaterial = \"clay\"\n"
+            );
+            f.write("s.toml", scene);
+            f.run("render s.toml -o s.exr --spp 16 --full-float").succeeds();
+            ["R", "G", "B"].map(|name| plane(&f, "s.exr", name))
+        });
+        for other in &seen[1..] {
+            for (a, b) in seen[0].iter().flatten().zip(other.iter().flatten()) {
+                // Texels of 0.05 on a side, slopes of 1/2: a texel's mean is off by half of it at most.
+                assert!((a - b).abs() < 0.0125, "{to:?}: {a} {b}");
+            }
+        }
+    }
 }
