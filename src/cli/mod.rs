@@ -3,6 +3,7 @@
 mod args;
 mod bench;
 mod bench_error;
+mod canvas;
 mod check;
 mod convert;
 mod crosscheck;
@@ -10,6 +11,7 @@ mod denoise;
 mod info;
 mod interrupt;
 mod list;
+mod live;
 mod manual;
 mod output;
 mod progress;
@@ -19,6 +21,7 @@ mod scene_args;
 mod sky_arg;
 mod summary;
 mod target_args;
+mod watch;
 
 use crate::error::{Error, Result};
 use crate::memory;

@@ -57,6 +57,11 @@ pub struct OutputPlan {
 }
 
 impl OutputArgs {
+    /// The first picture that is written.
+    pub fn first(&self) -> &Path {
+        self.outputs.first().map_or(Path::new(""), PathBuf::as_path)
+    }
+
     /// Errors for unknown names, and where a picture could not be written.
     pub fn check(&self) -> Result<OutputPlan> {
         let names: Vec<&str> = self.aov.iter().map(String::as_str).collect();

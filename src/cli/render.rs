@@ -6,6 +6,7 @@ use super::progress::Bar;
 use super::scene_args::SceneArgs;
 use super::summary::Record;
 use super::target_args::{TargetArgs, TargetPlan, warn_if_missed};
+use super::watch::{WatchArgs, Watchers};
 use super::{Setting, interrupt};
 use crate::base::intersectable::{BuildQuality, KernelMode, KernelOptions};
 use crate::base::registry::{self, Node, Value};
@@ -33,6 +34,8 @@ pub struct RenderArgs {
     scene: SceneArgs,
     #[command(flatten)]
     output: OutputArgs,
+    #[command(flatten)]
+    watch: WatchArgs,
     #[command(flatten)]
     sampling: SamplingArgs,
     #[command(flatten)]
@@ -133,6 +136,7 @@ enum QualityArg {
 pub fn run(args: &RenderArgs, setting: &Setting) -> Result<()> {
     let start = Instant::now();
     let plan = args.check()?;
+    let watch = args.watch.check()?;
     let desc = args.scene.load()?;
     let settings = args.sampling.settings(&desc, &plan, setting.threads)?;
     if plan.output.denoises && settings.spp < 2 {
@@ -151,8 +155,9 @@ pub fn run(args: &RenderArgs, setting: &Setting) -> Result<()> {
     let scene = build_scene(desc, &options)?;
     log::info!("{} threads, {}", setting.threads, scene.kernel.describe());
     let bar = Bar::new(setting.quiet, renderer.settings.time);
-    let rendered = renderer.render(&scene, &bar);
-    bar.finish();
+    let watchers = Watchers::new(watch, bar, args.output.first(), &renderer.settings, scene.background)?;
+    let rendered = renderer.render(&scene, &watchers);
+    watchers.rendered();
     let rendered = rendered?;
     let stats = &rendered.stats;
     warn_if_missed(renderer.settings.target.as_ref(), stats.reached.as_ref(), stats.spp);
@@ -167,6 +172,7 @@ pub fn run(args: &RenderArgs, setting: &Setting) -> Result<()> {
             None => Ok(()),
         }
     })?;
+    watchers.finish();
     if !setting.quiet {
         eprint!("{record}");
     }

@@ -47,6 +47,15 @@ pub trait Progress: Sync {
     fn should_stop(&self) -> bool {
         false
     }
+
+    /// Whether [`Progress::tile`] wants to be called; asked once a tile.
+    fn wants_tiles(&self) -> bool {
+        false
+    }
+
+    /// What a tile's pixels have come to, row by row: mean radiance and alpha. Told after each round's samples of the tile
+    /// are in, by the thread that took them, which waits meanwhile.
+    fn tile(&self, _rect: PixelRect, _means: &[[f32; 4]]) {}
 }
 
 /// No progress is shown.
@@ -320,8 +329,12 @@ fn render_round(
         if let Some(notes) = &mut sums.2 {
             notes.add_tile(&task.rect, &worker.notes, &worker.spent);
         }
+        let means = progress.wants_tiles().then(|| sums.0.means(task.rect));
         drop(sums);
         lock(workers).push(worker);
+        if let Some(means) = means {
+            progress.tile(task.rect, &means);
+        }
         // Where samples are dealt by need, a tile counts as if they were not: the sum is known beforehand.
         let end = if job.counts.is_some() { job.settings.spp } else { task.samples.end };
         progress.advance(task.rect.area() as u64 * u64::from(end.saturating_sub(task.samples.start)));

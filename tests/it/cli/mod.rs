@@ -5,6 +5,7 @@ mod bench;
 mod bench_error;
 mod crosscheck;
 mod denoise;
+mod display_server;
 mod folder;
 #[cfg(target_os = "linux")]
 mod memory;
