@@ -8,6 +8,7 @@ mod check;
 mod convert;
 mod crosscheck;
 mod denoise;
+mod explain;
 mod info;
 mod interrupt;
 mod list;

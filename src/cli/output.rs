@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 #[command(next_help_heading = "Output")]
 pub struct OutputArgs {
     /// The picture to write; the extension says how. May be given several times
-    #[arg(short, long = "output", required = true, value_name = "OUT.exr|png|jpg")]
+    #[arg(short, long = "output", required_unless_present = "explain", value_name = "OUT.exr|png|jpg")]
     outputs: Vec<PathBuf>,
     /// Further layers, for EXR (see `skylit list aov`)
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]

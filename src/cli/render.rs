@@ -1,6 +1,7 @@
 //! `skylit render`: load, build, render, save.
 
 use super::args::{CropWindow, duration};
+use super::explain::ExplainArgs;
 use super::output::{OutputArgs, OutputPlan, PictureInfo};
 use super::progress::Bar;
 use super::scene_args::SceneArgs;
@@ -40,6 +41,8 @@ pub struct RenderArgs {
     sampling: SamplingArgs,
     #[command(flatten)]
     kernel: KernelArgs,
+    #[command(flatten)]
+    explain: ExplainArgs,
     /// Write the summary as JSON, too
     #[arg(long, value_name = "FILE.json", help_heading = "Output")]
     stats: Option<PathBuf>,
@@ -152,8 +155,12 @@ pub fn run(args: &RenderArgs, setting: &Setting) -> Result<()> {
         log::warn!("the scene has no object: only the sky can be seen");
     }
     let options = args.kernel.options(setting.threads, expected_rays(&renderer.settings));
-    let scene = build_scene(desc, &options)?;
+    let mut scene = build_scene(desc, &options)?;
     log::info!("{} threads, {}", setting.threads, scene.kernel.describe());
+    if let Some(pixel) = args.explain.wanted() {
+        let io = (&args.scene, args.stats.as_deref());
+        return args.explain.run(pixel, &renderer, &mut scene, io);
+    }
     let bar = Bar::new(setting.quiet, renderer.settings.time);
     let watchers = Watchers::new(watch, bar, args.output.first(), &renderer.settings, scene.background)?;
     let rendered = renderer.render(&scene, &watchers);

@@ -6,6 +6,7 @@ mod bench_error;
 mod crosscheck;
 mod denoise;
 mod display_server;
+mod explain;
 mod folder;
 #[cfg(target_os = "linux")]
 mod memory;
