@@ -15,6 +15,7 @@ mod list;
 mod live;
 mod manual;
 mod output;
+mod preview;
 mod progress;
 mod render;
 mod rounds;

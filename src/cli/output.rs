@@ -85,6 +85,11 @@ impl OutputArgs {
         })
     }
 
+    /// How pictures of 8 bits show the scene, whose own curve this is.
+    pub fn look(&self, plan: &OutputPlan, of_scene: Transfer) -> Look {
+        Look { transfer: self.transfer.map_or(of_scene, |TransferArg(t)| t), ..plan.look }
+    }
+
     /// Writes every output, each whole or not at all; tells what was done to the noise.
     pub fn write(
         &self,
@@ -105,8 +110,7 @@ impl OutputArgs {
         let has_layers = |path: &Path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
         let shows_one = self.denoise && !self.outputs.iter().all(|path| has_layers(path));
         let shown = shows_one.then(|| denoise::shown(&picture));
-        let transfer = self.transfer.map_or(info.transfer, |TransferArg(t)| t);
-        let look = Look { transfer, ..plan.look };
+        let look = self.look(plan, info.transfer);
         let options = WriteOptions { look, alpha: info.background == Background::Transparent };
         self.outputs.iter().try_for_each(|path| {
             let picture = shown.as_ref().filter(|_| !has_layers(path)).unwrap_or(&picture);

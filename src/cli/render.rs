@@ -3,11 +3,10 @@
 use super::args::{CropWindow, duration};
 use super::explain::ExplainArgs;
 use super::output::{OutputArgs, OutputPlan, PictureInfo};
-use super::progress::Bar;
 use super::scene_args::SceneArgs;
 use super::summary::Record;
 use super::target_args::{TargetArgs, TargetPlan, warn_if_missed};
-use super::watch::{WatchArgs, Watchers};
+use super::watch::{Picture, WatchArgs, Watchers};
 use super::{Setting, interrupt};
 use crate::base::intersectable::{BuildQuality, KernelMode, KernelOptions};
 use crate::base::registry::{self, Node, Value};
@@ -161,8 +160,13 @@ pub fn run(args: &RenderArgs, setting: &Setting) -> Result<()> {
         let io = (&args.scene, args.stats.as_deref());
         return args.explain.run(pixel, &renderer, &mut scene, io);
     }
-    let bar = Bar::new(setting.quiet, renderer.settings.time);
-    let watchers = Watchers::new(watch, bar, args.output.first(), &renderer.settings, scene.background)?;
+    let shown = Picture {
+        output: args.output.first(),
+        settings: &renderer.settings,
+        background: scene.background,
+        look: args.output.look(&plan.output, transfer),
+    };
+    let mut watchers = Watchers::new(watch, &shown, setting.quiet)?;
     let rendered = renderer.render(&scene, &watchers);
     watchers.rendered();
     let rendered = rendered?;

@@ -1,15 +1,18 @@
 //! Who looks on while a picture is rendered: the progress bar, and what shows the picture as it grows.
 
 use super::live::{self, Live, Server, Shown};
+use super::preview::{self, Preview, PreviewKind};
 use super::progress::Bar;
 use crate::base::pixel_rect::PixelRect;
 use crate::error::Result;
+use crate::image::tonemap::Look;
 use crate::render::Progress;
 use crate::render::adaptive::Reached;
 use crate::render::settings::RenderSettings;
 use crate::scene::desc::Background;
 use clap::Args;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Flags of what shows the picture as it grows.
 #[derive(Args)]
@@ -18,11 +21,27 @@ pub struct WatchArgs {
     /// Show the picture as it grows in a tev that listens there, such as 127.0.0.1:14158
     #[arg(long, value_name = "HOST:PORT")]
     display_server: Option<String>,
+    /// Show the picture as it grows on the terminal: by half-block characters, or sixels where the terminal shows them
+    #[arg(long, value_name = "auto|blocks|sixel", num_args = 0..=1, require_equals = true, default_missing_value = "auto")]
+    preview: Option<PreviewKind>,
 }
 
 /// Connected, and waiting for the picture's size.
 pub struct Watch {
     server: Option<Server>,
+    preview: Option<PreviewKind>,
+}
+
+/// What is there to be seen.
+pub struct Picture<'a> {
+    /// Where it is written.
+    pub output: &'a Path,
+    /// Its size and window.
+    pub settings: &'a RenderSettings,
+    /// What is behind everything.
+    pub background: Background,
+    /// How pictures of 8 bits show it.
+    pub look: Look,
 }
 
 impl WatchArgs {
@@ -31,43 +50,49 @@ impl WatchArgs {
     /// # Errors
     /// See [`live::connect`].
     pub fn check(&self) -> Result<Watch> {
-        Ok(Watch { server: self.display_server.as_deref().map(live::connect).transpose()? })
+        let server = self.display_server.as_deref().map(live::connect).transpose()?;
+        Ok(Watch { server, preview: self.preview })
     }
 }
 
 /// All that look on.
 pub struct Watchers {
-    bar: Bar,
+    bar: Arc<Bar>,
     live: Option<Live>,
+    preview: Option<Preview>,
 }
 
 impl Watchers {
-    /// For a picture that is written to `output`.
+    /// Begins to show a picture; on the terminal nothing if `quiet`.
     ///
     /// # Errors
     /// No room for what is to be shown.
-    pub fn new(
-        watch: Watch,
-        bar: Bar,
-        output: &Path,
-        settings: &RenderSettings,
-        background: Background,
-    ) -> Result<Self> {
+    pub fn new(watch: Watch, picture: &Picture, quiet: bool) -> Result<Self> {
+        let Picture { output, settings, background, look } = picture;
         let shown = |server| {
             let shown = Shown {
                 name: output.file_name().unwrap_or_default().to_string_lossy().into_owned(),
                 frame: settings.size,
                 window: settings.crop,
-                alpha: background == Background::Transparent,
+                alpha: *background == Background::Transparent,
             };
             Live::start(server, shown)
         };
-        Ok(Watchers { bar, live: watch.server.map(shown).transpose()? })
+        let live = watch.server.map(shown).transpose()?;
+        let kind = watch.preview.filter(|_| !quiet && preview::can_show());
+        // Two that draw would draw over each other.
+        let bar = Arc::new(Bar::new(quiet || kind.is_some(), settings.time));
+        let start = |kind| Preview::start(kind, settings.crop, *look, bar.clone());
+        let preview = kind.map(start).transpose()?;
+        Ok(Watchers { bar, live, preview })
     }
 
-    /// The render is over: clears the screen.
-    pub fn rendered(&self) {
+    /// The render is over: leaves the screen.
+    pub fn rendered(&mut self) {
         self.bar.finish();
+        if let Some(preview) = self.preview.take() {
+            preview.finish();
+        }
     }
 
     /// The picture is written: those who are slow may have the rest.
@@ -92,12 +117,15 @@ impl Progress for Watchers {
     }
 
     fn wants_tiles(&self) -> bool {
-        self.live.is_some()
+        self.live.is_some() || self.preview.is_some()
     }
 
     fn tile(&self, rect: PixelRect, means: &[[f32; 4]]) {
         if let Some(live) = &self.live {
             live.tile(rect, means);
+        }
+        if let Some(preview) = &self.preview {
+            preview.put(rect, means);
         }
     }
 }

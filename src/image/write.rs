@@ -171,6 +171,11 @@ fn encoder(transfer: Transfer) -> impl Fn(f32) -> u8 {
     }
 }
 
+/// What a picture of 8 bits shows of a radiance.
+pub fn display_bytes(look: &Look, radiance: Rgb) -> [u8; 3] {
+    look.apply(radiance).to_array().map(encoder(look.transfer))
+}
+
 /// Rows of 8-bit samples, `channels` (3 or 4) a pixel.
 fn to_bytes(picture: &Picture, look: &Look, channels: usize) -> io::Result<Vec<u8>> {
     let plane = |name: &str| picture.plane(name).or_else(|| picture.plane("Y")).map(|p| &p.data);

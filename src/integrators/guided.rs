@@ -189,7 +189,7 @@ impl Block<'_> {
     }
 
     /// A point on the guided light, or on one that is chosen.
-    #[inline]
+    #[inline(always)]
     pub(super) fn sample_one(
         &self,
         s: &Surface,
@@ -207,7 +207,7 @@ impl Block<'_> {
         Some((chosen, self.sample(s, guided, how, chosen.light, point.light)?))
     }
 
-    #[inline]
+    #[inline(always)]
     pub(super) fn sample(
         &self,
         s: &Surface,

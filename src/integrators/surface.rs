@@ -272,7 +272,7 @@ impl Surface<'_> {
 
 impl Block<'_> {
     /// One light and one point on it, unless nothing can arrive.
-    #[inline]
+    #[inline(always)]
     pub(super) fn sample_light(
         &self,
         at: &Receiver,

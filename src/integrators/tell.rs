@@ -11,6 +11,8 @@ use super::story::{End, Fate, Leg, Lit, Met, Onward, Scattered, Stop, Story};
 use super::surface::{Course, Surface, key, survival};
 use super::together::{Found, Together};
 use super::{CameraBatch, PathId, PathResults, Workspace, light_dim};
+use crate::base::directions::LANES;
+use crate::base::hit::Hit;
 use crate::base::light::{ChosenLight, LightSample, PathEnd};
 use crate::base::ray::{Coherence, RayBatch};
 use crate::color::Rgb;
@@ -202,7 +204,7 @@ impl PathTracer {
         let u = draw(&id, Dim::at(block.depth, Slot::BsdfUv));
         let lobes = match s.look.picks_lobe {
             true => draw(&id, Dim::at(block.depth, Slot::LobeAndRoulette))[0],
-            false => [0.0; crate::base::directions::LANES],
+            false => [0.0; LANES],
         };
         let one = |k: usize| {
             let b = s.material.sample(&s.prepared, s.wo, [u[0][k], u[1][k]], lobes[k]);
@@ -323,7 +325,7 @@ impl Telling<'_> {
         {
             self.meet(block, &s.state, light, &PathEnd { wi: -s.v.wo, vertex: Some(&s.v) }, ray);
         }
-        let hit = crate::base::hit::Hit { t: s.v.t, prim: s.v.prim, path: s.v.path };
+        let hit = Hit { t: s.v.t, prim: s.v.prim, path: s.v.path };
         let goes_on = goes_on && !s.material.is_black();
         Stop { hit, vertex: s.v, goes_on, lit: Vec::new(), onward: Vec::new() }
     }

@@ -107,7 +107,12 @@ impl Display for MetRecord {
 impl SurfaceRecord {
     fn meet(&self, f: &mut Formatter<'_>) -> fmt::Result {
         writeln!(f, "  meets {} at t {}; material {}", self.what, self.t, self.material)?;
-        writeln!(f, "  point {} (world {})", Row(&self.point), Row(&self.world_point))?;
+        write!(f, "  point {}", Row(&self.point))?;
+        // Render space is the world's own in most scenes.
+        if self.world_point.map(|v| v as f32) != self.point {
+            write!(f, " (in the world {})", Row(&self.world_point.map(|v| format!("{v:.7}"))))?;
+        }
+        writeln!(f)?;
         write!(f, "  normal {}", Row(&self.normal))?;
         if self.normal != self.shading_normal {
             write!(f, ", shading normal {}", Row(&self.shading_normal))?;
