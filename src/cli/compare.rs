@@ -1,6 +1,7 @@
 //! `skylit compare`: pictures against a reference.
 
 use super::args::{CropWindow, number_in};
+use super::statistical_args::StatisticalArgs;
 use super::{Setting, interrupt, print};
 use crate::base::image_data::Encoding;
 use crate::compare::comparison::{CompareOptions, Comparison, compare};
@@ -11,6 +12,8 @@ use crate::compare::metrics::{self, MetricOptions, PIXELS_PER_DEGREE};
 use crate::compare::open::{Crop, Mask, PairOptions, Source};
 use crate::compare::pair::Space;
 use crate::compare::present;
+use crate::compare::statistics::equivalence::Answer;
+use crate::compare::statistics::{Outcome, Question, StatisticalResult};
 use crate::error::{Error, Result};
 use crate::image::load::LoadOptions;
 use crate::image::write::{check_file, write_file};
@@ -36,6 +39,8 @@ pub struct CompareArgs {
     what: WhatArgs,
     #[command(flatten)]
     choices: ChoiceArgs,
+    #[command(flatten)]
+    statistical: StatisticalArgs,
     #[command(flatten)]
     output: OutputArgs,
 }
@@ -150,6 +155,9 @@ impl FromStr for CropArg {
 struct Record<'a> {
     machine: &'a Machine,
     comparisons: &'a [Comparison],
+    /// What the tests of the pairs came to, in the same order.
+    #[serde(skip_serializing_if = "<[_]>::is_empty")]
+    statistical: &'a [StatisticalResult],
     /// Pictures that only one of two folders has.
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     alone: &'a [PathBuf],
@@ -165,8 +173,11 @@ pub fn run(args: &CompareArgs, setting: &Setting) -> Result<()> {
     let options = args.options()?;
     let (pairs, alone) = args.pairs()?;
     let (mut comparisons, mut shown) = (Vec::new(), Vec::new());
+    let mut tested = Vec::new();
     let mut kept: Option<Source> = None;
-    for [reference, test] in &pairs {
+    for [given, test_given] in &pairs {
+        // Of several pictures of one scene the first stands for all where figures are taken.
+        let [reference, test] = &[given, test_given].map(|g| args.statistical.files(g).swap_remove(0));
         let source = match kept.take().filter(|k| k.path == *reference) {
             Some(source) => source,
             None => Source::read(reference, &options.load)?,
@@ -174,21 +185,25 @@ pub fn run(args: &CompareArgs, setting: &Setting) -> Result<()> {
         let test = Source::read(test, &options.load)?;
         let compare_options = options.of(&source)?;
         let (comparison, pair) = compare(&source, &test, &compare_options)?;
-        match o.html {
-            Some(_) => shown.push(Shown::new(comparison.clone(), &pair, &source, &test)),
-            None => {}
+        if args.statistical.statistical {
+            let question = args.question(&compare_options.pair);
+            tested.push(args.statistical.run(given, test_given, &question)?);
+        }
+        if o.html.is_some() {
+            shown.push(Shown::new(comparison.clone(), &pair, [&source, &test], tested.last()));
         }
         comparisons.push(comparison);
         kept = Some(source);
     }
-    let missed = args.missed(&comparisons, &alone);
+    let mut missed = args.missed(&comparisons, &alone);
+    missed.extend(comparisons.iter().zip(&tested).filter_map(|(c, t)| failed(c, t)));
     let page = match o.html {
-        Some(_) => Some(html::report(&shown, &Machine::here(), o.lossless, Vec::new()).to_html()?),
+        Some(_) => Some(html::report(&shown, &Machine::here(), o.lossless).to_html()?),
         None => None,
     };
     interrupt::hold_off(|| {
         o.html.as_deref().zip(page).map_or(Ok(()), |(path, page)| write_file(path, page.as_bytes()))?;
-        args.write(&comparisons, &alone, &missed)
+        args.write(&comparisons, &tested, &alone, &missed)
     })?;
     if !setting.quiet {
         missed.iter().for_each(|m| log::info!("{m}"));
@@ -197,6 +212,17 @@ pub fn run(args: &CompareArgs, setting: &Setting) -> Result<()> {
         [] => Ok(()),
         all => Err(Error::Failed(format!("compare: {}", all.join("; ")))),
     }
+}
+
+/// What a test says against a picture.
+fn failed(c: &Comparison, t: &StatisticalResult) -> Option<String> {
+    let margin = t.equivalence.as_ref().filter(|e| e.answer != Answer::Equivalent);
+    let words = match margin {
+        Some(e) => &e.sentence,
+        None if t.outcome == Outcome::Different => &t.sentence,
+        None => return None,
+    };
+    Some(format!("{}: {words}", c.test))
 }
 
 fn is_stdout(path: &Path) -> bool {
@@ -290,6 +316,14 @@ impl CompareArgs {
         Ok((pairs, alone))
     }
 
+    /// What is asked of the noise; the mask is a region of its own.
+    fn question(&self, options: &PairOptions) -> Question {
+        let mut question = self.statistical.question();
+        let name = self.what.object.map_or("mask".to_owned(), |n| format!("object {n}"));
+        question.masks.extend(options.mask.as_ref().map(|m| (name, m.counted.clone())));
+        question
+    }
+
     /// Limits that were missed, in words. Where there is a limit, a picture without a partner misses it.
     fn missed(&self, all: &[Comparison], alone: &[PathBuf]) -> Vec<String> {
         let limits: Vec<&Limit> = self.output.fail_above.iter().chain(&self.output.fail_below).collect();
@@ -301,7 +335,13 @@ impl CompareArgs {
         missed
     }
 
-    fn write(&self, all: &[Comparison], alone: &[PathBuf], missed: &[String]) -> Result<()> {
+    fn write(
+        &self,
+        all: &[Comparison],
+        tested: &[StatisticalResult],
+        alone: &[PathBuf],
+        missed: &[String],
+    ) -> Result<()> {
         let o = &self.output;
         let mut printed = false;
         let mut put = |path: &Option<PathBuf>, text: &dyn Fn() -> Result<String>| match path {
@@ -313,7 +353,8 @@ impl CompareArgs {
             None => Ok(()),
         };
         put(&o.json, &|| {
-            let record = Record { machine: &Machine::here(), comparisons: all, alone, missed };
+            let record =
+                Record { machine: &Machine::here(), comparisons: all, statistical: tested, alone, missed };
             let text = serde_json::to_string_pretty(&record);
             text.map(|t| t + "\n").map_err(|e| Error::Internal(format!("cannot write the record: {e}")))
         })?;
@@ -323,6 +364,10 @@ impl CompareArgs {
             return Ok(());
         }
         let mut text = present::text(all);
+        for (c, tested) in all.iter().zip(tested) {
+            let heading = if all.len() > 1 { format!("{}: ", c.test) } else { String::new() };
+            text += &format!("\n{heading}{}", tested.to_text());
+        }
         alone.iter().for_each(|p| text += &format!("without a partner: {}\n", p.display()));
         print(text.as_bytes())
     }

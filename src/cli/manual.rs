@@ -14,8 +14,9 @@ pub struct CompletionsArgs {
 /// Flags of `skylit man`.
 #[derive(Args)]
 pub struct ManArgs {
-    /// The page of one verb instead of the whole command's
-    verb: Option<String>,
+    /// The page of one verb instead of the whole command's, such as `render` or `bench rays`
+    #[arg(value_name = "VERB")]
+    verbs: Vec<String>,
 }
 
 /// Prints a shell's completions.
@@ -29,15 +30,16 @@ pub fn completions(args: &CompletionsArgs) -> Result<()> {
 pub fn man(args: &ManArgs) -> Result<()> {
     let mut whole = command();
     whole.build();
-    let page = match &args.verb {
-        None => whole,
-        Some(name) => {
-            let known = whole.get_subcommands().map(clap::Command::get_name);
-            let message = unknown_name("verb", name, known);
-            let verb = whole.find_subcommand(name).cloned().ok_or(Error::Usage(message))?;
-            verb.display_name(format!("skylit-{name}"))
-        }
-    };
+    let (mut page, mut full_name) = (whole, String::from("skylit"));
+    for name in &args.verbs {
+        let message = match page.has_subcommands() {
+            true => unknown_name("verb", name, page.get_subcommands().map(clap::Command::get_name)),
+            false => format!("{full_name} has no verbs of its own, such as \"{name}\""),
+        };
+        page = page.find_subcommand(name).cloned().ok_or(Error::Usage(message))?;
+        full_name += &format!("-{name}");
+    }
+    let page = page.display_name(full_name);
     let mut text = Vec::new();
     let rendered = clap_mangen::Man::new(page).render(&mut text);
     rendered.map_err(|e| Error::Internal(format!("cannot make the manual page: {e}")))?;

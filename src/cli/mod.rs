@@ -3,16 +3,20 @@
 mod args;
 mod bench;
 mod bench_error;
+mod canvas;
 mod check;
 mod compare;
 mod convert;
 mod crosscheck;
 mod denoise;
+mod explain;
 mod info;
 mod interrupt;
 mod list;
+mod live;
 mod manual;
 mod output;
+mod preview;
 mod progress;
 mod render;
 mod rounds;
@@ -22,6 +26,7 @@ mod sky_arg;
 mod statistical_args;
 mod summary;
 mod target_args;
+mod watch;
 
 use crate::error::{Error, Result};
 use crate::memory;

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 #[command(next_help_heading = "Output")]
 pub struct OutputArgs {
     /// The picture to write; the extension says how. May be given several times
-    #[arg(short, long = "output", required = true, value_name = "OUT.exr|png|jpg")]
+    #[arg(short, long = "output", required_unless_present = "explain", value_name = "OUT.exr|png|jpg")]
     outputs: Vec<PathBuf>,
     /// Further layers, for EXR (see `skylit list aov`)
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
@@ -59,6 +59,11 @@ pub struct OutputPlan {
 }
 
 impl OutputArgs {
+    /// The first picture that is written.
+    pub fn first(&self) -> &Path {
+        self.outputs.first().map_or(Path::new(""), PathBuf::as_path)
+    }
+
     /// Errors for unknown names, and where a picture could not be written.
     pub fn check(&self) -> Result<OutputPlan> {
         let names: Vec<&str> = self.aov.iter().map(String::as_str).collect();
@@ -83,6 +88,11 @@ impl OutputArgs {
         })
     }
 
+    /// How pictures of 8 bits show the scene, whose own curve this is.
+    pub fn look(&self, plan: &OutputPlan, of_scene: Transfer) -> Look {
+        Look { transfer: self.transfer.map_or(of_scene, |TransferArg(t)| t), ..plan.look }
+    }
+
     /// Writes every output, each whole or not at all; tells what was done to the noise.
     pub fn write(
         &self,
@@ -103,8 +113,7 @@ impl OutputArgs {
         let has_layers = |path: &Path| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr"));
         let shows_one = self.denoise && !self.outputs.iter().all(|path| has_layers(path));
         let shown = shows_one.then(|| denoise::shown(&picture));
-        let transfer = self.transfer.map_or(info.transfer, |TransferArg(t)| t);
-        let look = Look { transfer, ..plan.look };
+        let look = self.look(plan, info.transfer);
         let alpha = info.background == Background::Transparent;
         let options = WriteOptions { look, alpha, ..WriteOptions::default() };
         self.outputs.iter().try_for_each(|path| {

@@ -13,6 +13,8 @@ use std::time::{Duration, Instant};
 pub struct Bar {
     bar: ProgressBar,
     done: AtomicU64,
+    /// The most samples that will be taken.
+    total: AtomicU64,
     started: Instant,
     /// With a limit the bar counts time, since nobody knows how many samples that will be.
     limit: Option<Duration>,
@@ -32,7 +34,29 @@ impl Bar {
             ProgressDrawTarget::stderr_with_hz(DRAWS_PER_SECOND)
         };
         let bar = ProgressBar::with_draw_target(None, target);
-        Bar { bar, done: AtomicU64::new(0), started: Instant::now(), limit, error: Mutex::default() }
+        Bar {
+            bar,
+            done: AtomicU64::new(0),
+            total: AtomicU64::new(0),
+            started: Instant::now(),
+            limit,
+            error: Mutex::default(),
+        }
+    }
+
+    /// In a line, for those who draw it themselves.
+    pub fn line(&self) -> String {
+        let elapsed = self.started.elapsed().as_secs_f64();
+        let done = self.done.load(Ordering::Relaxed) as f64;
+        let part = match self.limit {
+            Some(limit) => elapsed / limit.as_secs_f64(),
+            None => done / self.total.load(Ordering::Relaxed).max(1) as f64,
+        };
+        let part = part.min(1.0);
+        let error = self.error.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let left = elapsed * (1.0 / part.max(1e-9) - 1.0);
+        let left = if part > 0.0 { format!("  {left:.0} s left") } else { String::new() };
+        format!("render {:3.0} %  {}{error}{left}", part * 100.0, self.rate())
     }
 
     /// Takes it off the screen.
@@ -48,6 +72,7 @@ impl Bar {
 
 impl Progress for Bar {
     fn begin(&self, samples: u64) {
+        self.total.store(samples, Ordering::Relaxed);
         if self.bar.is_hidden() {
             return;
         }
@@ -81,6 +106,7 @@ impl Progress for Bar {
             // The squared error falls as the samples grow.
             let done = self.done.load(Ordering::Relaxed);
             let needed = done as f64 * (reached.at_most / target).powi(2).max(1.0);
+            self.total.store(needed as u64, Ordering::Relaxed);
             self.bar.set_length(needed as u64);
         }
     }

@@ -1,11 +1,12 @@
 //! `skylit render`: load, build, render, save.
 
 use super::args::{CropWindow, duration};
+use super::explain::ExplainArgs;
 use super::output::{OutputArgs, OutputPlan, PictureInfo};
-use super::progress::Bar;
 use super::scene_args::SceneArgs;
 use super::summary::Record;
 use super::target_args::{TargetArgs, TargetPlan, warn_if_missed};
+use super::watch::{Picture, WatchArgs, Watchers};
 use super::{Setting, interrupt};
 use crate::base::intersectable::{BuildQuality, KernelMode, KernelOptions};
 use crate::base::registry::{self, Node, Value};
@@ -34,9 +35,13 @@ pub struct RenderArgs {
     #[command(flatten)]
     output: OutputArgs,
     #[command(flatten)]
+    watch: WatchArgs,
+    #[command(flatten)]
     sampling: SamplingArgs,
     #[command(flatten)]
     kernel: KernelArgs,
+    #[command(flatten)]
+    explain: ExplainArgs,
     /// Write the summary as JSON, too
     #[arg(long, value_name = "FILE.json", help_heading = "Output")]
     stats: Option<PathBuf>,
@@ -133,6 +138,7 @@ enum QualityArg {
 pub fn run(args: &RenderArgs, setting: &Setting) -> Result<()> {
     let start = Instant::now();
     let plan = args.check()?;
+    let watch = args.watch.check()?;
     let desc = args.scene.load()?;
     let settings = args.sampling.settings(&desc, &plan, setting.threads)?;
     if plan.output.denoises && settings.spp < 2 {
@@ -148,11 +154,21 @@ pub fn run(args: &RenderArgs, setting: &Setting) -> Result<()> {
         log::warn!("the scene has no object: only the sky can be seen");
     }
     let options = args.kernel.options(setting.threads, expected_rays(&renderer.settings));
-    let scene = build_scene(desc, &options)?;
+    let mut scene = build_scene(desc, &options)?;
     log::info!("{} threads, {}", setting.threads, scene.kernel.describe());
-    let bar = Bar::new(setting.quiet, renderer.settings.time);
-    let rendered = renderer.render(&scene, &bar);
-    bar.finish();
+    if let Some(pixel) = args.explain.wanted() {
+        let io = (&args.scene, args.stats.as_deref());
+        return args.explain.run(pixel, &renderer, &mut scene, io);
+    }
+    let shown = Picture {
+        output: args.output.first(),
+        settings: &renderer.settings,
+        background: scene.background,
+        look: args.output.look(&plan.output, transfer),
+    };
+    let mut watchers = Watchers::new(watch, &shown, setting.quiet)?;
+    let rendered = renderer.render(&scene, &watchers);
+    watchers.rendered();
     let rendered = rendered?;
     let stats = &rendered.stats;
     warn_if_missed(renderer.settings.target.as_ref(), stats.reached.as_ref(), stats.spp);
@@ -167,6 +183,7 @@ pub fn run(args: &RenderArgs, setting: &Setting) -> Result<()> {
             None => Ok(()),
         }
     })?;
+    watchers.finish();
     if !setting.quiet {
         eprint!("{record}");
     }

@@ -5,6 +5,7 @@ use super::metrics::{self, Better};
 use super::open::Source;
 use super::pair::{Pair, Planes, Side, Space};
 use super::present::{figures, overview, remarks};
+use super::statistics::StatisticalResult;
 use crate::report::machine::Machine;
 use crate::report::table::Table;
 use crate::report::viewer::{ErrorMap, Region, Viewed, Viewer};
@@ -21,6 +22,39 @@ pub struct Shown {
     pub test: Vec<[f32; 3]>,
     /// How either came to be: name and value.
     pub facts: [Vec<(String, String)>; 2],
+    /// Whether the difference is more than noise.
+    pub tested: Option<Tested>,
+}
+
+/// What a page shows of a test.
+pub struct Tested {
+    /// In words, whole, regions and tiles in a table, p-values in bars.
+    section: Section,
+    /// How surely each tile differs.
+    map: Vec<f32>,
+}
+
+/// Tiles of this or less are drawn in the brightest colour: -log10 of a p-value.
+const SUREST: f32 = 8.0;
+
+impl Tested {
+    fn new(result: &StatisticalResult) -> Self {
+        let mut section = Section::new("Is one of them biased?").prose(format!(
+            "{}.\n\nDesign: {}. Tiles of {} pixels a side; {}.",
+            result.sentence,
+            result.design_text(),
+            result.tile,
+            result.uniformity_text()
+        ));
+        section = section.with(result.table()).with(result.families_table());
+        if result.uniformity.is_some() {
+            section = section.with(result.histogram());
+        }
+        if let Some(e) = &result.equivalence {
+            section = section.prose(e.sentence.clone());
+        }
+        Tested { section, map: result.p_map() }
+    }
 }
 
 /// Facts that a picture's file tells of how it was made; the rest is too long to be read.
@@ -43,7 +77,12 @@ const FACTS: [&str; 14] = [
 
 impl Shown {
     /// Keeps what a page needs.
-    pub fn new(comparison: Comparison, pair: &Pair, reference: &Source, test: &Source) -> Self {
+    pub fn new(
+        comparison: Comparison,
+        pair: &Pair,
+        [reference, test]: [&Source; 2],
+        tested: Option<&StatisticalResult>,
+    ) -> Self {
         let facts = |s: &Source| {
             let picture = &s.loaded.picture;
             let mut all = vec![("file".to_owned(), s.path.display().to_string())];
@@ -54,6 +93,7 @@ impl Shown {
             reference: colors(pair, Side::Reference),
             test: colors(pair, Side::Test),
             facts: [facts(reference), facts(test)],
+            tested: tested.map(Tested::new),
             comparison,
         }
     }
@@ -70,7 +110,7 @@ fn colors(pair: &Pair, side: Side) -> Vec<[f32; 3]> {
 }
 
 /// The page of some comparisons. Those of one reference and size stand in one viewer.
-pub fn report(shown: &[Shown], machine: &Machine, lossless: bool, further: Vec<Section>) -> Report {
+pub fn report(shown: &[Shown], machine: &Machine, lossless: bool) -> Report {
     let all: Vec<&Comparison> = shown.iter().map(|s| &s.comparison).collect();
     let references: Vec<&str> = all.iter().map(|c| c.reference.as_str()).collect();
     let one = references.windows(2).all(|w| w[0] == w[1]);
@@ -92,7 +132,7 @@ pub fn report(shown: &[Shown], machine: &Machine, lossless: bool, further: Vec<S
         rest = others;
     }
     report = report.section(numbers(shown));
-    further.into_iter().fold(report, Report::section)
+    shown.iter().filter_map(|s| s.tested.as_ref()).fold(report, |r, t| r.section(t.section.clone()))
 }
 
 /// One sentence about all of them.
@@ -170,6 +210,17 @@ fn pictures(group: &[Shown], lossless: bool) -> Section {
 }
 
 /// Maps that the page cannot work out of the values itself.
+fn maps(shown: &Shown, test: usize) -> Vec<ErrorMap> {
+    let mut all: Vec<ErrorMap> = shown.comparison.figures.iter().filter_map(|f| map(f, test)).collect();
+    // A test is of whole pictures.
+    if let Some(t) = shown.tested.as_ref().filter(|t| t.map.len() == shown.test.len()) {
+        let help = "-log10 of the probability that chance alone brings as much as in this tile: 2 is one in a hundred".into();
+        let values = t.map.clone();
+        all.push(ErrorMap { metric: "-log10 p".into(), help, test, values, high: Some(SUREST) });
+    }
+    all
+}
+
 fn map(figure: &Figure, test: usize) -> Option<ErrorMap> {
     let metric = metrics::REGISTRY.iter().find(|m| m.name == figure.metric)?;
     let values = figure.map.clone().filter(|_| ["ssim", "flip", "hdr-flip"].contains(&metric.name))?;

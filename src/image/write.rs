@@ -4,6 +4,8 @@
 mod radiance;
 mod shown;
 
+pub use shown::display_bytes;
+
 use super::exr_write;
 use super::picture::Picture;
 use super::tonemap::Look;

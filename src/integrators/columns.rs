@@ -7,7 +7,7 @@ use super::guided::Rivals;
 use super::path::{PathScratch, PathState, PathTracer};
 use super::points::PointLanes;
 use super::strategy::Strategy;
-use super::surface::{Look, Surface};
+use super::surface::{Look, Surface, survival};
 use super::together::Alike;
 use crate::base::lanes::{Columns, LANES};
 use crate::base::light::Receiver;
@@ -61,7 +61,7 @@ impl PathTracer {
         let n = *n;
         let PathScratch { states, next, hits, points, .. } = paths;
         let points = points.lanes(alike.first, n);
-        let roulette = block.depth >= self.roulette_depth && block.depth < self.max_depth;
+        let roulette = self.gambles(block);
         let mut lobes = [[0.0; LANES]; 2];
         if roulette || plain.look.picks_lobe {
             let [x, y] = &mut lobes;
@@ -87,8 +87,7 @@ impl PathTracer {
             let across = |t: Transmission| t.eta2(wo.get(lane), samples.wi.get(lane));
             let eta2 = before.eta2 * plain.look.transmission.map_or(1.0, across);
             if roulette {
-                // See `PathTracer::extend`.
-                let q = (beta * eta2).max_component().min(0.95);
+                let q = survival(beta, eta2);
                 if lobes[1][lane] >= q {
                     gambled += 1;
                     continue;

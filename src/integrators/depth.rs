@@ -89,7 +89,7 @@ impl Block<'_> {
 
     /// What a scattered ray counts that ends on a light, which light samples find with density `light`.
     #[inline]
-    fn weight(&self, state: &PathState, light: f32) -> f32 {
+    pub(super) fn weight(&self, state: &PathState, light: f32) -> f32 {
         match self.mis {
             true => power(state.pdf, light),
             false if light > 0.0 => 0.0,
@@ -104,7 +104,7 @@ impl Block<'_> {
 
     /// The density per solid angle with which light samples from `from` find `end` on a light.
     #[inline]
-    fn light_pdf(&self, light: u32, end: &PathEnd, from: &Receiver) -> f32 {
+    pub(super) fn light_pdf(&self, light: u32, end: &PathEnd, from: &Receiver) -> f32 {
         match self.each_light {
             true => self.scene.lights.list[light as usize].pdf_li(from, end),
             false => self.scene.lights.pdf(light, end, from),

@@ -18,20 +18,20 @@ use glam::Vec3;
 const FEW: f32 = 2.0;
 
 /// A guided light and its index.
-type Guided<'a> = (u32, &'a dyn GuidedLight);
+pub(super) type Guided<'a> = (u32, &'a dyn GuidedLight);
 
 /// How the guided light is found from a surface.
 #[derive(Clone, Copy, Default)]
-struct How {
+pub(super) struct How {
     strategy: Strategy,
     /// What the light has worked out for the surface.
     guide: Guide,
     /// Whether it can be sampled at all.
     ready: bool,
     /// Light samples; where they are not several, of any light.
-    lit: u32,
+    pub lit: u32,
     /// Scattered rays that compete with each.
-    scattered: u32,
+    pub scattered: u32,
 }
 
 /// Light samples on the guided light that compete with a scattered ray. Their density is worked out where the ray finds the
@@ -140,13 +140,13 @@ impl How {
     }
 
     /// Whether light samples have counted all that scattered rays would find, and there is nothing else to be found.
-    fn ends(&self, block: &Block) -> bool {
+    pub(super) fn ends(&self, block: &Block) -> bool {
         self.strategy.is_light() && block.guided_alone
     }
 }
 
 impl Block<'_> {
-    fn how(&self, (_, light): Guided, s: &Surface) -> How {
+    pub(super) fn how(&self, (_, light): Guided, s: &Surface) -> How {
         let delta = s.material.is_delta();
         let strategy = if delta { Strategy::Bsdf } else { self.strategies.of(s.v.object, s.v.slot) };
         let mut guide = Guide::default();
@@ -189,8 +189,8 @@ impl Block<'_> {
     }
 
     /// A point on the guided light, or on one that is chosen.
-    #[inline]
-    fn sample_one(
+    #[inline(always)]
+    pub(super) fn sample_one(
         &self,
         s: &Surface,
         guided: Guided,
@@ -207,8 +207,8 @@ impl Block<'_> {
         Some((chosen, self.sample(s, guided, how, chosen.light, point.light)?))
     }
 
-    #[inline]
-    fn sample(
+    #[inline(always)]
+    pub(super) fn sample(
         &self,
         s: &Surface,
         (index, light): Guided,

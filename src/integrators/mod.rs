@@ -15,8 +15,10 @@ mod pending;
 mod pilot;
 mod points;
 mod several;
+pub mod story;
 pub mod strategy;
 mod surface;
+mod tell;
 mod together;
 pub mod whitted;
 
@@ -267,6 +269,12 @@ pub trait Integrator: Send + Sync {
     /// An integrator of the same estimate that suits this scene better, decided by a pilot that is a function of its
     /// arguments alone; None where there is nothing to decide.
     fn specialise(&self, _scene: &Scene, _plan: &PilotPlan) -> Option<Specialised> {
+        None
+    }
+
+    /// What the path of the only ray of a batch goes through, as [`Integrator::trace`] traces it; None from those that tell
+    /// nothing but their rays.
+    fn tell(&self, _scene: &Scene, _batch: &CameraBatch, _work: &mut Workspace) -> Option<story::Story> {
         None
     }
 }

@@ -6,6 +6,7 @@ use super::escapes::Escapes;
 use super::guided::Rivals;
 use super::pending::Pending;
 use super::points::VertexPoints;
+use super::story::Story;
 use super::strategy::{Strategies, Strategy};
 use super::together::Together;
 use super::{CameraBatch, FirstHit, Integrator, PathResults, PilotPlan, Specialised, Workspace, pilot};
@@ -209,6 +210,10 @@ impl Integrator for PathTracer {
     fn specialise(&self, scene: &Scene, plan: &PilotPlan) -> Option<Specialised> {
         pilot::choose(self, scene, plan)
     }
+
+    fn tell(&self, scene: &Scene, batch: &CameraBatch, work: &mut Workspace) -> Option<Story> {
+        Some(self.tell_path(scene, batch, work))
+    }
 }
 
 /// None where it is to be tried out.
@@ -230,7 +235,7 @@ impl PathTracer {
         })
     }
 
-    fn block<'a>(&'a self, scene: &'a Scene, batch: &'a CameraBatch, depth: u32) -> Block<'a> {
+    pub(super) fn block<'a>(&'a self, scene: &'a Scene, batch: &'a CameraBatch, depth: u32) -> Block<'a> {
         let lights = &scene.lights;
         let samples_lights = self.light_sampling && scene.features.sampled_lights;
         let guided = if samples_lights { lights.guided() } else { None };
@@ -335,7 +340,7 @@ impl PathTracer {
 
 impl PathScratch {
     /// Which rays met something, and which leave.
-    fn sort_out(&mut self, hits: &HitBatch, rays: &RayBatch) {
+    pub(super) fn sort_out(&mut self, hits: &HitBatch, rays: &RayBatch) {
         self.hits.clear();
         for (i, &prim) in (0..).zip(&hits.prim) {
             if prim == NO_PRIMITIVE {
@@ -347,12 +352,12 @@ impl PathScratch {
     }
 
     /// Draws the points of all hits; `path_of` tells the path of a ray.
-    fn draw(&mut self, block: &Block, path_of: impl Fn(&[PathState], u32) -> u32) {
+    pub(super) fn draw(&mut self, block: &Block, path_of: impl Fn(&[PathState], u32) -> u32) {
         let paths = self.hits.iter().map(|&i| path_of(&self.states, i));
         self.points.draw(block.ids, paths, block.depth, block.samples_lights);
     }
 
-    fn begin(&mut self, next: &mut RayBatch, shadow: &mut RayBatch) {
+    pub(super) fn begin(&mut self, next: &mut RayBatch, shadow: &mut RayBatch) {
         self.next.clear();
         self.pending.clear();
         self.escapes.clear();

@@ -9,11 +9,12 @@ use super::guided::Rivals;
 use super::path::{PathScratch, PathState, PathTracer};
 use super::pending::Pending;
 use super::points::VertexPoint;
+use super::story::Weighed;
 use super::together::{Alike, Found};
 use super::{PathId, light_dim};
 use crate::base::lanes::LANES;
 use crate::base::light::{ChosenLight, LightSample, Receiver};
-use crate::base::material::{Material, Prepared, Transmission};
+use crate::base::material::{BsdfSample, Material, Prepared, Transmission};
 use crate::base::vertex::Vertex;
 use crate::color::Rgb;
 use crate::sampler::{Dim, SHADOW_KEY, Slot, ray_key};
@@ -192,35 +193,21 @@ impl PathTracer {
         work: &mut Workspace,
         paths: &mut PathScratch,
     ) {
-        let VertexPoint { id, bsdf, .. } = *point;
-        let roulette = block.depth >= self.roulette_depth && block.depth < self.max_depth;
-        let lobe = if roulette || s.look.picks_lobe {
-            id.sampler.get_2d(id.index, Dim::at(block.depth, Slot::LobeAndRoulette))
-        } else {
-            [0.0; 2]
-        };
-        let Some(b) = s.material.sample(&s.prepared, s.wo, bsdf, lobe[0]) else {
+        let roulette = self.gambles(block);
+        let lobe = self.lobe(block, s, point);
+        let Some(Course { b, wi, mut beta, eta2 }) = s.onward(point.bsdf, lobe[0]) else {
             work.avoided.absorbed += 1;
             return;
         };
-        let wi = s.v.frame.to_world(b.wi);
-        let mut beta = s.state.beta * b.weight;
-        if beta.is_black() || !s.v.is_consistent(wi) {
-            work.avoided.absorbed += 1;
-            return;
-        }
-        let eta2 = s.state.eta2 * s.look.transmission.map_or(1.0, |t| t.eta2(s.wo, b.wi));
         if roulette {
-            // Survival by throughput, in terms of the medium that the path began in: what radiance lost on entering
-            // glass it gains again on leaving. Never certain, so that no path of a white scene lives for ever.
-            let q = (beta * eta2).max_component().min(0.95);
+            let q = survival(beta, eta2);
             if lobe[1] >= q {
                 work.avoided.roulette += 1;
                 return;
             }
             beta = beta / q;
         }
-        work.next.push(&s.v.spawn(wi, key(&id, block.depth + 1)));
+        work.next.push(&s.v.spawn(wi, key(&point.id, block.depth + 1)));
         // Light sampling competes wherever it is tried at all, also where it found nothing this time.
         let competes = block.samples_lights && !s.look.is_delta && !b.delta;
         let state = PathState {
@@ -233,12 +220,64 @@ impl PathTracer {
         };
         paths.next.push(state);
     }
+
+    /// Whether Russian roulette is played at a depth.
+    #[inline(always)]
+    pub(super) fn gambles(&self, block: &Block) -> bool {
+        block.depth >= self.roulette_depth && block.depth < self.max_depth
+    }
+
+    /// What picks a lobe and, after that, plays roulette; zeros where neither is asked for.
+    #[inline(always)]
+    pub(super) fn lobe(&self, block: &Block, s: &Surface, VertexPoint { id, .. }: &VertexPoint) -> [f32; 2] {
+        match self.gambles(block) || s.look.picks_lobe {
+            true => id.sampler.get_2d(id.index, Dim::at(block.depth, Slot::LobeAndRoulette)),
+            false => [0.0; 2],
+        }
+    }
+}
+
+/// The chance of a path to survive: by throughput, in terms of the medium that the path began in: what radiance lost on
+/// entering glass it gains again on leaving. Never certain, so that no path of a white scene lives for ever.
+#[inline(always)]
+pub(super) fn survival(beta: Rgb, eta2: f32) -> f32 {
+    (beta * eta2).max_component().min(0.95)
+}
+
+/// A direction in which a path may go on.
+pub(super) struct Course {
+    pub b: BsdfSample,
+    /// The direction in render space.
+    pub wi: Vec3,
+    /// See [`PathState::beta`], before roulette.
+    pub beta: Rgb,
+    /// See [`PathState::eta2`].
+    pub eta2: f32,
+}
+
+impl Surface<'_> {
+    /// What is scattered, if anything is.
+    #[inline(always)]
+    pub(super) fn onward(&self, bsdf: [f32; 2], lobe: f32) -> Option<Course> {
+        let b = self.material.sample(&self.prepared, self.wo, bsdf, lobe)?;
+        let wi = self.v.frame.to_world(b.wi);
+        let beta = self.state.beta * b.weight;
+        if beta.is_black() || !self.v.is_consistent(wi) {
+            return None;
+        }
+        let eta2 = self.state.eta2 * self.look.transmission.map_or(1.0, |t| t.eta2(self.wo, b.wi));
+        Some(Course { b, wi, beta, eta2 })
+    }
 }
 
 impl Block<'_> {
     /// One light and one point on it, unless nothing can arrive.
-    #[inline]
-    fn sample_light(&self, at: &Receiver, point: &VertexPoint) -> Option<(ChosenLight, LightSample)> {
+    #[inline(always)]
+    pub(super) fn sample_light(
+        &self,
+        at: &Receiver,
+        point: &VertexPoint,
+    ) -> Option<(ChosenLight, LightSample)> {
         let (lights, id) = (&self.scene.lights, &point.id);
         let chosen = if self.scene.features.many_lights {
             let pick = id.sampler.get_1d(id.index, Dim::at(self.depth, Slot::LightPick));
@@ -278,21 +317,34 @@ impl Block<'_> {
         work: &mut Workspace,
         paths: &mut PathScratch,
     ) {
+        let Some(Weighed { value, .. }) = self.weigh(s, chosen, l, scattered) else { return };
+        let id = paths.points.get(s.number).id;
+        work.shadow.push(&s.v.spawn_to(l.wi, l.dist, key(&id, self.depth) ^ SHADOW_KEY));
+        let ask = l.li.is_none().then_some(chosen.light);
+        paths.pending.push(Pending { value, index: s.state.index, ask });
+    }
+
+    /// What was sampled of a light counts, if anything of it gets to the viewer.
+    #[inline(always)]
+    pub(super) fn weigh(
+        &self,
+        s: &Surface,
+        chosen: ChosenLight,
+        l: &LightSample,
+        scattered: f32,
+    ) -> Option<Weighed> {
         if !s.v.is_consistent(l.wi) {
-            return;
+            return None;
         }
         let e = s.material.eval(&s.prepared, s.wo, s.v.frame.to_local(l.wi));
         let value = s.state.beta * e.f_cos * l.li.unwrap_or(Rgb::WHITE);
         if value.is_black() {
-            return;
+            return None;
         }
         let pdf = chosen.pmf * l.pdf;
         let alone = l.delta || scattered == 0.0 || !self.mis;
         let weight = if alone { 1.0 } else { power(pdf, scattered * e.pdf) };
-        let id = paths.points.get(s.number).id;
-        work.shadow.push(&s.v.spawn_to(l.wi, l.dist, key(&id, self.depth) ^ SHADOW_KEY));
-        let ask = l.li.is_none().then_some(chosen.light);
-        paths.pending.push(Pending { value: value * (weight / pdf), index: s.state.index, ask });
+        Some(Weighed { f_cos: e.f_cos, bsdf_pdf: e.pdf, pdf, weight, value: value * (weight / pdf) })
     }
 }
 

@@ -17,11 +17,11 @@ use std::ops::Range;
 
 /// Rays that are traced together. Large enough that the kernel's batches and the loops over columns run long,
 /// small enough that a block's state stays in the second-level cache (about 100 bytes a ray).
-const BATCH: usize = 2048;
+pub(super) const BATCH: usize = 2048;
 
-/// A non-finite sample, kept for the report.
+/// Which sample of which pixel: one that is not finite, kept for the report, or one that is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BadSample {
+pub struct SampleId {
     /// Pixel.
     pub x: u32,
     /// Pixel.
@@ -64,7 +64,7 @@ pub struct Worker {
     /// Scratch memory and ray counts.
     pub work: Workspace,
     /// Samples that were not finite, the first few.
-    pub bad: Vec<BadSample>,
+    pub bad: Vec<SampleId>,
     /// What the tile's pixels showed, row by row, and what that took; where [`Job::notes`] asks for it.
     pub notes: Vec<Note>,
     /// See `notes`.
@@ -175,9 +175,7 @@ impl Worker {
     pub fn render_tile(&mut self, job: &Job, rect: PixelRect, range: Range<u32>) {
         self.film.reset(rect);
         self.layers.reset(rect);
-        self.batch.spread = job.scene.camera.pixel_spread();
-        self.batch.want_first = !job.settings.aovs.is_empty();
-        self.batch.times = 1;
+        self.start_batch(job);
         self.notes.clear();
         self.notes.resize(if job.notes { rect.area() } else { 0 }, Note::default());
         let free = |x, y| job.coverage.is_some_and(|c| !c.is_covered(x, y));
@@ -288,25 +286,54 @@ impl Worker {
         }
     }
 
+    /// Makes the camera rays of what has been gathered.
+    fn aim(&mut self, job: &Job) {
+        self.place_samples(job);
+        let samples =
+            FilmSamples { x: &self.film_x, y: &self.film_y, lens_u: &self.lens_u, lens_v: &self.lens_v };
+        job.scene.camera.fill_rays(&samples, &mut self.batch.rays);
+    }
+
+    /// The camera rays of the first `n` samples from one on, no more than a batch, as its tile has them; and their places on
+    /// the film.
+    pub fn aim_at(&mut self, job: &Job, sample: SampleId, n: usize) -> (&CameraBatch, [&[f32]; 2]) {
+        self.start_batch(job);
+        let SampleId { x, y, replicate, index } = sample;
+        let outlined = job.outlines.filter(|o| o.pixels.contains(x, y));
+        self.batch.times = outlined.map_or(1, |o| o.pixels.times());
+        let points = outlined.map_or(job.points, |o| o.points);
+        self.forget();
+        self.add_run(&points, Run { x, y, replicate, first_index: index, start: 0, len: n.min(BATCH) });
+        self.aim(job);
+        (&self.batch, [&self.film_x, &self.film_y])
+    }
+
+    fn start_batch(&mut self, job: &Job) {
+        self.batch.spread = job.scene.camera.pixel_spread();
+        self.batch.want_first = !job.settings.aovs.is_empty();
+        self.batch.times = 1;
+    }
+
+    fn forget(&mut self) {
+        self.runs.clear();
+        self.film_x.clear();
+        self.film_y.clear();
+        self.batch.ids.clear();
+    }
+
     /// Traces what has been gathered and adds it to the tile.
     fn flush(&mut self, job: &Job) {
         if self.film_x.is_empty() {
             return;
         }
-        self.place_samples(job);
-        let samples =
-            FilmSamples { x: &self.film_x, y: &self.film_y, lens_u: &self.lens_u, lens_v: &self.lens_v };
-        job.scene.camera.fill_rays(&samples, &mut self.batch.rays);
+        self.aim(job);
         job.integrator.trace(job.scene, &self.batch, &mut self.work, &mut self.results);
         let runs = std::mem::take(&mut self.runs);
         for run in &runs {
             self.collect(run, job);
         }
         self.runs = runs;
-        self.runs.clear();
-        self.film_x.clear();
-        self.film_y.clear();
-        self.batch.ids.clear();
+        self.forget();
     }
 
     /// Adds a run's results to the tile.
@@ -337,7 +364,7 @@ impl Worker {
         let li = &self.results.li[run.start..run.start + run.len];
         let bad = (run.first_index..).zip(li).filter(|(_, radiance)| !radiance.is_finite());
         for (index, _) in bad.take(8usize.saturating_sub(self.bad.len())) {
-            self.bad.push(BadSample { x: run.x, y: run.y, replicate: run.replicate, index });
+            self.bad.push(SampleId { x: run.x, y: run.y, replicate: run.replicate, index });
         }
     }
 }

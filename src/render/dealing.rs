@@ -95,6 +95,16 @@ pub fn first_samples(spp: u32) -> u32 {
     even_samples(spp) / FIRST
 }
 
+/// The binary logarithm of the most samples of a pixel.
+fn most_log2(spp: u32) -> u32 {
+    (spp.ilog2() + MOST_LOG2).min(u32::BITS - 1)
+}
+
+/// The most samples that a pixel may get.
+pub fn most_samples(spp: u32) -> u64 {
+    1 << most_log2(spp).max(even_samples(spp).ilog2())
+}
+
 /// The power of two next to `spp`, in doublings.
 fn even_samples(spp: u32) -> u32 {
     1 << f64::from(spp.max(FIRST)).log2().round().min(31.0) as u32
@@ -175,7 +185,7 @@ impl Notes {
         let plain = self.cost(Kind::Plain, &self.spent.plain, 1);
         let costs = [plain, self.cost(Kind::Outline, &self.spent.outlines, times)];
         let means = [0, 1].map(|colour| self.mean_of(1 - colour));
-        let most = (spp.ilog2() + MOST_LOG2).min(u32::BITS - 1);
+        let most = most_log2(spp);
         let dealer = Dealer { first, spp, most, times: f64::from(times) };
         let width = self.rect.width() as usize;
         let place = |at: usize| (self.rect.x0 + (at % width) as u32, self.rect.y0 + (at / width) as u32);

@@ -266,6 +266,16 @@ impl Film {
         pixel.counts.iter().all(|&n| n > 0).then(|| [half(0), half(1)])
     }
 
+    /// Means of some pixels in the window, row by row: red, green, blue and alpha, as [`Film::picture`] has them.
+    pub fn means(&self, rect: PixelRect) -> Vec<[f32; 4]> {
+        let mean = |(x, y)| {
+            let sums = self.sums(x, y);
+            let [r, g, b] = sums.mean().map(|v| v as f32);
+            [r, g, b, sums.alpha()]
+        };
+        rect.pixels().map(mean).collect()
+    }
+
     /// The means as planes `R G B A`, without metadata.
     pub fn picture(&self, kind: SampleKind) -> Picture {
         let mut picture = Picture::new(self.window.width() as usize, self.window.height() as usize);

@@ -6,27 +6,29 @@ pub mod backdrop;
 pub mod block;
 pub mod coverage;
 pub mod dealing;
+pub mod explain;
 pub mod film;
 pub mod film_layers;
 pub mod fixed;
 pub mod layers;
 pub mod outlines;
+mod prelude;
 pub mod settings;
 
 use crate::base::pixel_rect::PixelRect;
 use crate::error::{Error, Result};
-use crate::integrators::{Avoided, Integrator, PilotPlan, RayCounts, Specialised};
+use crate::integrators::{Avoided, Integrator, RayCounts};
 use crate::memory;
 use crate::scene::Scene;
 use adaptive::{Reached, Schedule, Task};
-use block::{BadSample, Job, Outlined, Worker};
+use block::{Job, SampleId, Worker};
 use dealing::Notes;
 use film::Film;
 use layers::Layers;
-use outlines::Outlines;
+use prelude::Prelude;
 use rayon::prelude::*;
 use serde::Serialize;
-use settings::{OUTLINES, RenderSettings};
+use settings::RenderSettings;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -47,6 +49,15 @@ pub trait Progress: Sync {
     fn should_stop(&self) -> bool {
         false
     }
+
+    /// Whether [`Progress::tile`] wants to be called; asked once a tile.
+    fn wants_tiles(&self) -> bool {
+        false
+    }
+
+    /// What a tile's pixels have come to, row by row: mean radiance and alpha. Told after each round's samples of the tile
+    /// are in, by the thread that took them, which waits meanwhile.
+    fn tile(&self, _rect: PixelRect, _means: &[[f32; 4]]) {}
 }
 
 /// No progress is shown.
@@ -95,7 +106,7 @@ pub struct RenderStats {
     /// Samples that were not finite and were left out.
     pub dropped: u64,
     /// The first few of them.
-    pub bad: Vec<BadSample>,
+    pub bad: Vec<SampleId>,
     /// Whether it was stopped before its last tile.
     pub interrupted: bool,
     /// What the integrator decided beforehand; empty if nothing.
@@ -141,6 +152,11 @@ impl Renderer {
     /// Renders; the film depends on the scene and the settings alone (and, with a time limit, on how many rounds
     /// the clock allowed). Errors on bad settings and on a failure inside a kernel's callbacks.
     pub fn render(&self, scene: &Scene, progress: &dyn Progress) -> Result<Rendered> {
+        self.check(scene)?;
+        self.in_pool(|| self.render_rounds(scene, progress))
+    }
+
+    fn check(&self, scene: &Scene) -> Result<()> {
         self.settings.check()?;
         let placed = [scene.film.width, scene.film.height];
         if self.settings.size != placed {
@@ -148,11 +164,16 @@ impl Renderer {
                 format!("the camera was placed for a film of {placed:?}, not {:?}", self.settings.size);
             return Err(Error::Usage(message));
         }
+        Ok(())
+    }
+
+    /// By as many threads as the settings say.
+    fn in_pool<T: Send>(&self, work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(self.settings.threads.max(1))
             .build()
             .map_err(|e| Error::Internal(format!("cannot start {} threads: {e}", self.settings.threads)))?;
-        pool.install(|| self.render_rounds(scene, progress))
+        pool.install(work)
     }
 
     fn render_rounds(&self, scene: &Scene, progress: &dyn Progress) -> Result<Rendered> {
@@ -171,38 +192,10 @@ impl Renderer {
             layers: Layers::new(crop, &s.aovs),
             stats: RenderStats::default(),
         };
-        // A single sample a pixel shows what lies in its middle.
-        let most = s.outlines.unwrap_or(if self.integrator.gains_by_outlines(scene) { OUTLINES } else { 1 });
-        let outlines = if s.spp > 1 { Outlines::of(scene, crop, most) } else { None };
-        scene.kernel.take_failure()?;
-        let is_outline = |x, y| outlines.as_ref().is_some_and(|o| o.contains(x, y));
-        let plan = PilotPlan {
-            pixels: crop,
-            spp: s.spp,
-            seed: s.seed,
-            kind: s.sampler,
-            filter: s.filter,
-            is_outline: &is_outline,
-            outline_times: outlines.as_ref().map_or(1, Outlines::times),
-            by_need: s.deals(),
-        };
-        let adapted = if s.pilot { self.integrator.specialise(scene, &plan) } else { None };
-        let integrator = match adapted {
-            Some(Specialised { integrator, decided, rays }) => {
-                (out.stats.decided, out.stats.pilot) = (decided, rays);
-                integrator
-            }
-            None => self.integrator.clone(),
-        };
-        let skips = s.skip_background && s.spp > 1 && integrator.shows_background();
-        let coverage = if skips { backdrop::pays(scene, s.filter, crop, s.spp) } else { None };
-        out.stats.free_pixels = coverage.as_ref().map_or(0, |c| c.free() as u64);
-        let outlined = outlines.as_ref().map(|o| Outlined { pixels: o, points: s.outline_points(o.times()) });
-        let job = Job {
-            coverage: coverage.as_ref(),
-            outlines: outlined,
-            ..Job::new(scene, integrator.as_ref(), s)
-        };
+        let found = Prelude::new(self, scene)?;
+        out.stats.free_pixels = found.coverage.as_ref().map_or(0, |c| c.free() as u64);
+        (out.stats.decided, out.stats.pilot) = (found.decided.clone(), found.pilot);
+        let job = found.job(scene, s);
         let workers = Mutex::new(Vec::<Worker>::new());
         if s.deals() {
             dealt(&job, &workers, &mut out, progress)?;
@@ -218,7 +211,7 @@ impl Renderer {
             stats.spared += w.spared;
         }
         stats.samples = stats.rays.camera + stats.spared;
-        if let Some(outlines) = &outlines {
+        if let Some(outlines) = &found.outlines {
             stats.outlines = OutlineStats { pixels: outlines.count() as u64, times: outlines.times() };
             stats.pilot.camera += outlines.rays;
         }
@@ -320,8 +313,12 @@ fn render_round(
         if let Some(notes) = &mut sums.2 {
             notes.add_tile(&task.rect, &worker.notes, &worker.spent);
         }
+        let means = progress.wants_tiles().then(|| sums.0.means(task.rect));
         drop(sums);
         lock(workers).push(worker);
+        if let Some(means) = means {
+            progress.tile(task.rect, &means);
+        }
         // Where samples are dealt by need, a tile counts as if they were not: the sum is known beforehand.
         let end = if job.counts.is_some() { job.settings.spp } else { task.samples.end };
         progress.advance(task.rect.area() as u64 * u64::from(end.saturating_sub(task.samples.start)));

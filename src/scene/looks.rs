@@ -99,7 +99,8 @@ impl Looks {
         for m in used {
             built.insert(m, build_material(&desc.materials[m].value, registry)?);
         }
-        let objects = objects.into_iter().map(|o| dress(o, &built, registry)).collect::<Result<Vec<_>>>()?;
+        let dressed = objects.into_iter().map(|o| dress(o, desc, &built, registry));
+        let objects = dressed.collect::<Result<Vec<_>>>()?;
         let lights = gather_lights(&Placed { geometry, objects: &objects, space }, desc, registry)?;
         let features = Features {
             needs: objects.iter().flat_map(|o| &o.materials).fold(Default::default(), |n, m| m.needs().or(n)),
@@ -114,15 +115,19 @@ impl Looks {
 
 fn dress(
     object: PlacedObject,
+    desc: &SceneDesc,
     built: &HashMap<usize, Arc<dyn Material>>,
     registry: &Registry,
 ) -> Result<Object> {
     let mut materials: Vec<Arc<dyn Material>> = object.materials.iter().map(|m| built[m].clone()).collect();
+    let look = |m: &Named<Node>| format!("{} ({})", m.name, m.value.kind);
+    let mut looks: Vec<String> = object.materials.iter().map(|m| look(&desc.materials[*m])).collect();
     if materials.is_empty() {
         let neutral = Node { kind: NEUTRAL.into(), params: Params::new(), place: object.place };
         materials.push(build_node("material", &registry.materials, &neutral)?);
+        looks.push(NEUTRAL.to_owned());
     }
-    Ok(Object { name: object.name, materials })
+    Ok(Object { name: object.name, materials, looks })
 }
 
 /// A material, every nested texture built first.
@@ -192,7 +197,7 @@ struct Placed<'a> {
 }
 
 fn gather_lights(placed: &Placed, desc: &SceneDesc, registry: &Registry) -> Result<Lights> {
-    let mut list: Vec<Arc<dyn Light>> = Vec::new();
+    let (mut list, mut kinds): (Vec<Arc<dyn Light>>, Vec<String>) = Default::default();
     if let Some(sky) = &desc.sky {
         let preset = skyboxes::presets::expand(&sky.node);
         let skybox = build_node("sky", &registry.skies, preset.as_ref().unwrap_or(&sky.node))?;
@@ -204,11 +209,15 @@ fn gather_lights(placed: &Placed, desc: &SceneDesc, registry: &Registry) -> Resu
                 sampling: sky.sampling.as_deref().map(str::parse).transpose()?.unwrap_or_default(),
             },
         )?));
+        kinds.push(format!("sky ({})", sky.node.kind));
     }
     for node in &desc.lights {
         let source = build_node("light", &registry.lights, node)?;
         list.push(source.place(placed.space)?);
+        kinds.push(format!("light {} ({})", list.len() - 1, node.kind));
     }
+    let mut shines = list.iter().map(|light| !light.is_black());
+    kinds.retain(|_| shines.next().unwrap_or(true));
     list.retain(|light| !light.is_black());
     let mut by_path = HashMap::new();
     let emits = |o: &Object| o.materials.iter().any(|m| m.emitter().is_some());
@@ -221,7 +230,7 @@ fn gather_lights(placed: &Placed, desc: &SceneDesc, registry: &Registry) -> Resu
     let extent = Extent { center: bounds.center(), radius: bounds.radius().max(1e-3) };
     let name = desc.render.light_sampler.as_deref().unwrap_or(lights::sampler::NAMES[0].0);
     let sampler = lights::sampler::by_name(name, &list, &extent)?;
-    Ok(Lights { list, sampler, at_infinity, emitting_objects, by_path })
+    Ok(Lights { list, sampler, at_infinity, emitting_objects, by_path, kinds })
 }
 
 /// One light for every placement of an emitting leaf, its shape baked into render space for sampling.

@@ -56,6 +56,8 @@ pub struct Object {
     pub name: String,
     /// Materials by slot; never empty.
     pub materials: Vec<Arc<dyn Material>>,
+    /// Their names and kinds, for people: "clay (diffuse)".
+    pub looks: Vec<String>,
 }
 
 /// The lights of a scene and the choice between them.
@@ -70,6 +72,8 @@ pub struct Lights {
     pub emitting_objects: Vec<bool>,
     /// The light of each emitting leaf, by instance path.
     pub by_path: HashMap<u64, u32>,
+    /// What the first of `list` are, for people; those after them are emitting leaves.
+    pub kinds: Vec<String>,
 }
 
 /// Counts and times of a build.

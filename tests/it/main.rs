@@ -12,6 +12,7 @@ mod corpus;
 mod crosscheck;
 mod dealing;
 mod each_light;
+mod explain;
 mod geometry;
 mod glass;
 mod kernels;

@@ -63,6 +63,11 @@ fn encoder<S: Sample>(transfer: Transfer) -> impl Fn(f32) -> S {
     }
 }
 
+/// What a picture of 8 bits shows of a radiance.
+pub fn display_bytes(look: &Look, radiance: Rgb) -> [u8; 3] {
+    look.apply(radiance).to_array().map(encoder(look.transfer))
+}
+
 /// Rows of samples, `channels` (3 or 4) a pixel, and how many pixels had a value that is not a number.
 fn samples<S: Sample>(picture: &Picture, look: &Look, channels: usize) -> io::Result<(Vec<S>, u64)> {
     let [r, g, b] = colour_planes(picture)?;

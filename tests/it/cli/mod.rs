@@ -7,10 +7,13 @@ mod compare;
 mod convert;
 mod crosscheck;
 mod denoise;
+mod display_server;
 mod equivalent;
+mod explain;
 mod folder;
 #[cfg(target_os = "linux")]
 mod memory;
+mod preview;
 mod skies;
 mod target;
 
@@ -51,6 +54,20 @@ fn lists_completions_and_manual_are_printed() {
     assert!(f.run("completions bash").succeeds().stdout.contains("--cropwindow"));
     assert!(f.run("man").succeeds().stdout.contains(".TH skylit"));
     assert!(f.run("man render").succeeds().stdout.contains("skylit\\-render"));
+    // Of verbs within verbs, and of every flag.
+    let nested = f.run("man bench rays").succeeds().stdout;
+    assert!(nested.contains("skylit\\-bench\\-rays") && nested.contains("triangles"), "{nested}");
+    f.refuses("man bench ray", 2, &["unknown verb \"ray\"", "did you mean \"rays\"?"]);
+    f.refuses("man render fast", 2, &["no verbs of its own"]);
+    for flag in ["display\\-server", "preview", "pixel", "explain", "worst", "sample"] {
+        assert!(f.run("man render").succeeds().stdout.contains(flag), "{flag}");
+    }
+    for shell in ["bash", "zsh", "fish"] {
+        let text = f.run(&format!("completions {shell}")).succeeds().stdout;
+        for flag in ["display-server", "preview", "pixel", "explain", "worst"] {
+            assert!(text.contains(flag), "{shell}: {flag}");
+        }
+    }
 }
 
 #[test]
