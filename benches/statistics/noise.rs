@@ -3,6 +3,33 @@
 use skylit::compare::statistics::distributions::normal_quantile;
 use skylit::compare::statistics::replicates::{Replicates, Spread};
 use skylit::sampler::hash::mix64;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Calls `f` with every number below `n`, on as many threads as there are processors, each of its own: a thread of a pool that
+/// waits for a render takes up the next number meanwhile, and another in that, until its stack is full.
+pub fn each<T: Send>(n: u64, f: impl Fn(u64) -> T + Sync) -> Vec<T> {
+    let next = AtomicU64::new(0);
+    let done = Mutex::new(Vec::new());
+    let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                loop {
+                    let i = next.fetch_add(1, Ordering::Relaxed);
+                    if i >= n {
+                        return;
+                    }
+                    let result = f(i);
+                    done.lock().unwrap().push((i, result));
+                }
+            });
+        }
+    });
+    let mut done = done.into_inner().unwrap();
+    done.sort_by_key(|(i, _)| *i);
+    done.into_iter().map(|(_, result)| result).collect()
+}
 
 /// A stream of numbers.
 pub struct Stream(u64);

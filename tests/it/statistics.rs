@@ -9,8 +9,7 @@ mod noise;
 #[path = "../../benches/statistics/scenes.rs"]
 mod scenes;
 
-use noise::{Colour, Noise, Stream, picture};
-use rayon::prelude::*;
+use noise::{Colour, Noise, Stream, each, picture};
 use scenes::{Bias, CASES, Prepared};
 use skylit::compare::statistics::equivalence::Answer;
 use skylit::compare::statistics::families::uniformity;
@@ -44,7 +43,7 @@ fn alarms(pairs: u64, make: &(dyn Fn(u64) -> Replicates + Sync), question: &Ques
         let r = compare(&make(2 * i), &make(2 * i + 1), question).unwrap();
         (r.outcome == Outcome::Different, r.tiles.iter().filter_map(|t| t.p).collect::<Vec<_>>())
     };
-    let all: Vec<(bool, Vec<f64>)> = (0..pairs).into_par_iter().map(of_pair).collect();
+    let all: Vec<(bool, Vec<f64>)> = each(pairs, of_pair);
     (all.iter().filter(|a| a.0).count(), all.into_iter().flat_map(|a| a.1).collect())
 }
 
@@ -245,7 +244,7 @@ fn margins_are_kept() {
             let b = b.scaled([1.0 + apart * margin; 3], |_| true);
             compare(&a, &b, &question).unwrap().equivalence.unwrap().answer
         };
-        (0..PAIRS).into_par_iter().map(of_pair).collect()
+        each(PAIRS, of_pair)
     };
     let count = |all: &[Answer], wanted| all.iter().filter(|a| **a == wanted).count();
     for apart in [1.0, -1.0] {
