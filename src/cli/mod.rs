@@ -22,7 +22,6 @@ mod render;
 mod rounds;
 mod scene_args;
 mod sky_arg;
-#[expect(dead_code)]
 mod statistical_args;
 mod summary;
 mod target_args;

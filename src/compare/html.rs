@@ -190,10 +190,7 @@ fn pictures(group: &[Shown], lossless: bool) -> Section {
     let mut pictures = vec![viewed(&names[0], &first.reference, &first.facts[0])];
     let tests = group.iter().zip(&names[1..]);
     pictures.extend(tests.map(|(s, name)| viewed(name, &s.test, &s.facts[1])));
-    let maps = group
-        .iter()
-        .enumerate()
-        .flat_map(|(i, s)| s.comparison.figures.iter().filter_map(move |f| map(f, i + 1)));
+    let maps = group.iter().enumerate().flat_map(|(i, s)| maps(s, i + 1));
     let regions = group.iter().enumerate().flat_map(|(i, s)| regions(&s.comparison, i + 1, group.len() > 1));
     let viewer = Viewer {
         size: c.size,
