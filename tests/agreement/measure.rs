@@ -29,7 +29,8 @@ fn pfm(path: &str) -> ([usize; 2], Pixels) {
 }
 
 fn psnr(a: &Pixels, b: &Pixels) -> Option<f64> {
-    let squares = a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| f64::from(a - b).powi(2));
+    let squares =
+        a.iter().flatten().zip(b.iter().flatten()).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2));
     let mean = squares.sum::<f64>() / (3 * a.len()) as f64;
     (mean > 0.0).then(|| -10.0 * mean.log10())
 }

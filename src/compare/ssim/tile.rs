@@ -232,10 +232,10 @@ impl Kernel for AlongColumns<'_> {
                 if !(top..bottom).contains(&y) {
                     continue;
                 }
-                for i in 0..LANES {
-                    let counts = x + i >= left && x + i < right;
-                    sums[0][i] += if counts { s.whole[i] } else { 0.0 };
-                    sums[1][i] += if counts { s.contrast[i] } else { 0.0 };
+                for (sums, values) in sums.iter_mut().zip([s.whole, s.contrast]) {
+                    for (i, (sum, v)) in sums.iter_mut().zip(values).enumerate() {
+                        *sum += if x + i >= left && x + i < right { v } else { 0.0 };
+                    }
                 }
             }
         }
