@@ -1,15 +1,14 @@
 //! LDR-FLIP (Andersson, Nilsson, Akenine-Moller, Oskarsson, Astrom, Fairchild, "FLIP: A Difference Evaluator for
-//! Alternating Images", 2020), by its authors' own code.
+//! Alternating Images", 2020).
 
 use super::picture::Pixels;
+use skylit::compare::flip::{DEFAULT_PPD, ldr};
 
 /// Mean of the error map at 67 pixels per degree, of 8-bit values taken as sRGB.
 pub fn mean(ours: &Pixels, reference: &Pixels) -> f64 {
-    let image = |p: &Pixels| {
-        let bytes: Vec<u8> = p.data.iter().flatten().map(|v| *v as u8).collect();
-        nv_flip::FlipImageRgb8::with_data(p.width as u32, p.height as u32, &bytes)
+    let image = |p: &Pixels| -> Vec<[f32; 3]> {
+        p.data.iter().map(|p| p.map(|v| f32::from(v as u8) / 255.0)).collect()
     };
-    let map = nv_flip::flip(image(reference), image(ours), nv_flip::DEFAULT_PIXELS_PER_DEGREE);
-    let map = map.to_vec();
-    map.iter().map(|v| f64::from(*v)).sum::<f64>() / map.len().max(1) as f64
+    let size = [ours.width, ours.height];
+    ldr(size, &image(reference), &image(ours), DEFAULT_PPD).expect("pictures of one size").mean
 }

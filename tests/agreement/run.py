@@ -29,6 +29,10 @@ from skimage.metrics import peak_signal_noise_ratio, structural_similarity
 HOME = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 DATA = os.environ.get("SKYLIT_DATA", os.path.join(HOME, "..", "shared", "data"))
 BEGIN, END = "<!-- agreement: begin -->", "<!-- agreement: end -->"
+LDR_HEADER = (
+    "pair | size | FLIP | less flip-evaluator's | SSIM | less scikit-image's | PSNR, dB | less scikit-image's"
+)
+HDR_HEADER = "pair | size | exposures, stops | HDR-FLIP | less flip-evaluator's"
 FLIP_LIMIT, SSIM_LIMIT, PSNR_LIMIT = 1e-4, 1e-6, 1e-6
 
 
@@ -94,7 +98,7 @@ def ldr_made():
     yield "black, white", np.zeros((40, 40, 3)), np.ones((40, 40, 3))
     yield "one gray, another", np.full((40, 40, 3), 0.5), np.full((40, 40, 3), 0.6)
     yield "equal", s, s
-    yield "one pixel wide", s[:, :1], s[:, 30:31]
+    yield "one pixel wide", s[:, :1], s[:, 80:81]
     yield "smaller than the filters", s[:7, :5], s[60:67, 60:65]
 
 
@@ -129,7 +133,7 @@ def hdr_made():
     yield "mostly black", np.where(grid(160, 120)[1] < 0.6, 0, s), s
     yield "constant", np.ones((40, 40, 3)), np.full((40, 40, 3), 1.5)
     yield "equal", sun, sun
-    yield "one pixel wide", s[:, :1], s[:, 30:31]
+    yield "one pixel wide", s[:, :1], s[:, 80:81]
 
 
 def read(path):
@@ -155,8 +159,9 @@ def ldr_found():
 
 def hdr_found():
     random = np.random.default_rng(13)
-    folder = os.path.join(DATA, "scenes")
-    for root, _, names in sorted(os.walk(folder)):
+    for root, _, names in sorted(os.walk(DATA)):
+        if os.path.relpath(root, DATA).split(os.sep)[0] not in ("scenes", "images"):
+            continue
         for name in sorted(names):
             if not name.endswith(".exr"):
                 continue
@@ -165,7 +170,7 @@ def hdr_found():
             except KeyError:
                 continue  # Not colours.
             noisy = picture * random.gamma(16, 1 / 16, picture.shape)
-            yield f"{os.path.relpath(os.path.join(root, name), folder)}, noise", picture, noisy
+            yield f"{os.path.relpath(os.path.join(root, name), DATA)}, noise", picture, noisy
 
 
 def write_pfm(path, p):
@@ -239,11 +244,12 @@ def main():
         folder = options.keep or temporary
         os.makedirs(folder, exist_ok=True)
         for header, sources, row in (
-            ("pair | size | FLIP | less flip-evaluator's | SSIM | less scikit-image's | PSNR, dB | less scikit-image's", (ldr_made, ldr_found), row_ldr),
-            ("pair | size | exposures, stops | HDR-FLIP | less flip-evaluator's", (hdr_made, hdr_found), row_hdr),
+            (LDR_HEADER, (ldr_made, ldr_found), row_ldr),
+            (HDR_HEADER, (hdr_made, hdr_found), row_hdr),
         ):
             names = header.split(" | ")
             lines += ["| " + header + " |", "|---|---|" + "---:|" * (len(names) - 2)]
+            print("\n".join(lines[-2:]))
             pairs = [p for source in sources for p in source() if options.only in p[0]]
             for i, (name, a, b) in enumerate(pairs):
                 line, good = row(folder, i, name, a, b)

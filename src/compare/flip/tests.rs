@@ -288,3 +288,22 @@ fn quantiles_are_those_of_sorted_errors() {
     let none = Summary { min: 0.0, quartile1: 0.0, median: 0.0, quartile3: 0.0, max: 0.0 };
     assert_eq!(Summary::new(&[0.0; 9]), none);
 }
+
+/// The pair of the test of crate nv-flip 0.1.2, and the values that it holds the authors' code to.
+#[test]
+fn published_values() {
+    let Some(data) = crate::testing::data_dir() else {
+        return;
+    };
+    let read = |name: &str| -> Picture {
+        let picture = image::open(data.join("images/flip").join(name)).unwrap().into_rgb8();
+        picture.pixels().map(|p| p.0.map(|v| f32::from(v) / 255.0)).collect()
+    };
+    let found = ldr_usual([640, 960], &read("tree-ref.png"), &read("tree-test.png"));
+    let s = Summary::new(&found.map);
+    assert!((found.mean - 0.133_285).abs() < 1e-4, "{}", found.mean);
+    let there = [0.0, 0.184_924, 0.333_241, 0.503_441, 0.983_044];
+    for (ours, there) in [s.min, s.quartile1, s.median, s.quartile3, s.max].into_iter().zip(there) {
+        assert!((ours - there).abs() < 1e-4, "{s:?}");
+    }
+}

@@ -84,23 +84,24 @@ impl Scratch {
         self.found.exposures.resize(area, 0);
         match pair.display {
             Display::Encoded => {
-                for (from, to) in self.stored.iter().zip(&mut self.ycxcz) {
-                    dispatch(Convert { colours: pair.colours, from, to: sized(to, from[0].len()) });
-                }
+                self.convert(pair, Encoded);
                 self.compare(pair, 0);
             }
             Display::Radiance(exposures, tone) => {
                 for (i, exposure) in exposures.iter().enumerate() {
                     let factor = f64::from(*exposure).exp2() as f32;
-                    for (from, to) in self.stored.iter().zip(&mut self.ycxcz) {
-                        let to = sized(to, from[0].len());
-                        dispatch(Expose { factor, tone, colours: pair.colours, from, to });
-                    }
+                    self.convert(pair, Exposed { factor, tone });
                     self.compare(pair, i as u16);
                 }
             }
         }
         &self.found
+    }
+
+    fn convert(&mut self, pair: &Pair, light: impl Light) {
+        for (from, to) in self.stored.iter().zip(&mut self.ycxcz) {
+            dispatch(Convert { light, colours: pair.colours, from, to: sized(to, from[0].len()) });
+        }
     }
 
     /// Takes the error of what is displayed now into account.
@@ -197,38 +198,45 @@ impl Window {
     }
 }
 
-/// Encoded values to YCxCz.
-struct Convert<'a> {
-    colours: &'a Colours,
-    from: &'a [Vec<f32>; 3],
-    to: &'a mut [Vec<f32>; 3],
+/// How stored values become linear light in [0, 1].
+trait Light: Copy {
+    fn linear(self, stored: [f32; 3]) -> [f32; 3];
 }
 
-impl Kernel for Convert<'_> {
-    type Output = ();
+/// They are sRGB-encoded.
+#[derive(Clone, Copy)]
+struct Encoded;
 
+impl Light for Encoded {
     #[inline(always)]
-    fn run(self) {
-        let n = self.from[0].len();
-        let [r, g, b] = self.from.each_ref().map(|p| &p[..n]);
-        let [y, cx, cz] = self.to.each_mut().map(|p| &mut p[..n]);
-        for i in 0..n {
-            let linear = [decode(unit(r[i])), decode(unit(g[i])), decode(unit(b[i]))];
-            [y[i], cx[i], cz[i]] = self.colours.ycxcz(linear);
-        }
+    fn linear(self, [r, g, b]: [f32; 3]) -> [f32; 3] {
+        [decode(unit(r)), decode(unit(g)), decode(unit(b))]
     }
 }
 
-/// Radiance to YCxCz of what is shown at an exposure.
-struct Expose<'a> {
+/// They are radiance, multiplied by an exposure.
+#[derive(Clone, Copy)]
+struct Exposed {
     factor: f32,
     tone: ToneMapper,
+}
+
+impl Light for Exposed {
+    #[inline(always)]
+    fn linear(self, [r, g, b]: [f32; 3]) -> [f32; 3] {
+        self.tone.shown([r * self.factor, g * self.factor, b * self.factor])
+    }
+}
+
+/// Stored values to YCxCz.
+struct Convert<'a, L> {
+    light: L,
     colours: &'a Colours,
     from: &'a [Vec<f32>; 3],
     to: &'a mut [Vec<f32>; 3],
 }
 
-impl Kernel for Expose<'_> {
+impl<L: Light> Kernel for Convert<'_, L> {
     type Output = ();
 
     #[inline(always)]
@@ -236,9 +244,9 @@ impl Kernel for Expose<'_> {
         let n = self.from[0].len();
         let [r, g, b] = self.from.each_ref().map(|p| &p[..n]);
         let [y, cx, cz] = self.to.each_mut().map(|p| &mut p[..n]);
-        let (f, tone, colours) = (self.factor, self.tone, *self.colours);
+        let (light, colours) = (self.light, *self.colours);
         for i in 0..n {
-            [y[i], cx[i], cz[i]] = colours.ycxcz(tone.shown([r[i] * f, g[i] * f, b[i] * f]));
+            [y[i], cx[i], cz[i]] = colours.ycxcz(light.linear([r[i], g[i], b[i]]));
         }
     }
 }

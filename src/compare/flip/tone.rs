@@ -119,7 +119,7 @@ impl Exposures {
     pub fn new(options: &HdrOptions, reference: &[[f32; 3]]) -> Result<Self> {
         let usage = |message: String| Err(Error::Usage(message));
         let (mut start, mut stop) = (options.start, options.stop);
-        if let Some(bad) = [start, stop].into_iter().flatten().find(|e| !(e.abs() <= 128.0)) {
+        if let Some(bad) = [start, stop].into_iter().flatten().find(|e| e.is_nan() || e.abs() > 128.0) {
             return usage(format!("exposures of HDR-FLIP are from -128 to 128 stops, not {bad}"));
         }
         if start.is_none() || stop.is_none() {
