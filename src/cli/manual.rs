@@ -32,11 +32,14 @@ pub fn man(args: &ManArgs) -> Result<()> {
     whole.build();
     let (mut page, mut full_name) = (whole, String::from("skylit"));
     for name in &args.verbs {
-        let message = match page.has_subcommands() {
-            true => unknown_name("verb", name, page.get_subcommands().map(clap::Command::get_name)),
-            false => format!("{full_name} has no verbs of its own, such as \"{name}\""),
+        let Some(verb) = page.find_subcommand(name).cloned() else {
+            let known = page.get_subcommands().map(clap::Command::get_name);
+            return Err(Error::Usage(match page.has_subcommands() {
+                true => unknown_name("verb", name, known),
+                false => format!("{full_name} has no verbs of its own, such as \"{name}\""),
+            }));
         };
-        page = page.find_subcommand(name).cloned().ok_or(Error::Usage(message))?;
+        page = verb;
         full_name += &format!("-{name}");
     }
     let page = page.display_name(full_name);

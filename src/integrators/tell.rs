@@ -238,7 +238,7 @@ impl PathTracer {
     }
 }
 
-/// Whose points follow one another, so many for each of another.
+/// Whose points follow one another.
 fn times(id: &PathId, n: u32) -> PathId {
     PathId { sampler: id.sampler.times(n), index: id.index.wrapping_mul(n), ..*id }
 }
@@ -390,7 +390,7 @@ impl Telling<'_> {
                 arrived.push((i, le, pending[i].value * le));
             }
         }
-        arrived.iter().for_each(|(_, _, value)| self.add(*value));
+        arrived.iter().for_each(|a| self.add(a.2));
         // Shadow rays of one depth leave from one surface.
         let (leg, of) = std::mem::take(&mut self.asked);
         let Some(stop) = self.at(leg) else { return };
