@@ -8,7 +8,7 @@ mod convert;
 mod crosscheck;
 mod denoise;
 mod equivalent;
-mod folder;
+pub mod folder;
 #[cfg(target_os = "linux")]
 mod memory;
 mod skies;
