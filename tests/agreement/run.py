@@ -17,6 +17,7 @@ import argparse
 import json
 import math
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -179,10 +180,13 @@ def write_pfm(path, p):
         f.write(np.ascontiguousarray(p[::-1], "<f4").tobytes())
 
 
-def ours(kind, paths):
-    """What we say of a pair of files."""
-    program = os.path.join(HOME, "target", "release", "examples", "measure")
-    return json.loads(subprocess.run([program, kind, *paths], check=True, capture_output=True).stdout)
+def ours(paths):
+    """What we say of a pair of files: figures by metric, with words on how they were taken."""
+    program = os.path.join(HOME, "target", "release", "skylit")
+    command = [program, "compare", *paths, "--metric", "flip,hdr-flip,ssim,psnr", "--json", "-", "--quiet"]
+    record = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
+    figures = record["comparisons"][0]["figures"]
+    return {f["metric"]: f["value"] for f in figures}, {f["metric"]: f.get("note", "") for f in figures}
 
 
 def evaluator(kind, a, b):
@@ -200,7 +204,7 @@ def row_ldr(folder, i, name, a, b):
     paths = [os.path.join(folder, f"ldr-{i}-{n}.png") for n in ("ref", "test")]
     for path, p in zip(paths, (a, b)):
         imageio.imwrite(path, p)
-    here = ours("ldr", paths)
+    here, _ = ours(paths)
     a, b = (p.astype(np.float32) / np.float32(255) for p in (a, b))
     there = {"flip": evaluator("ldr", a, b)[0], "ssim": None, "psnr": None}
     a, b = a.astype(np.float64), b.astype(np.float64)
@@ -223,12 +227,13 @@ def row_hdr(folder, i, name, a, b):
     paths = [os.path.join(folder, f"hdr-{i}-{n}.pfm") for n in ("ref", "test")]
     for path, p in zip(paths, (a, b)):
         write_pfm(path, p)
-    here = ours("hdr", paths)
+    here, notes = ours(paths)
     there, settings = evaluator("hdr", a, b)
     difference = here["hdr-flip"] - there
-    counts = here["count"], settings["numExposures"]
+    count, start, stop = re.match(r"(\d+) exposures from (\S+) to (\S+) stops", notes["hdr-flip"]).groups()
+    counts = int(count), settings["numExposures"]
     good = abs(difference) <= FLIP_LIMIT and counts[0] == counts[1]
-    exposures = f"{here['start']:.2f} to {here['stop']:.2f}, {counts[0]}"
+    exposures = f"{start} to {stop}, {count}"
     return f"| {name} | {a.shape[1]}x{a.shape[0]} | {exposures} | {here['hdr-flip']:.6f} | {difference:+.1e} |", good
 
 
@@ -238,7 +243,7 @@ def main():
     parser.add_argument("--only", default="")
     parser.add_argument("--keep")
     options = parser.parse_args()
-    subprocess.run(["cargo", "build", "--quiet", "--release", "--example", "measure"], cwd=HOME, check=True)
+    subprocess.run(["cargo", "build", "--quiet", "--release"], cwd=HOME, check=True)
     lines, misses, counts = [], [], []
     with tempfile.TemporaryDirectory() as temporary:
         folder = options.keep or temporary

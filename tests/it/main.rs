@@ -3,6 +3,7 @@
 mod adaptive;
 mod bad_geometry;
 mod bad_scenes;
+mod browser;
 mod classic;
 mod cli;
 mod columns;

@@ -10,7 +10,7 @@ mod denoise;
 mod display_server;
 mod equivalent;
 mod explain;
-mod folder;
+pub mod folder;
 #[cfg(target_os = "linux")]
 mod memory;
 mod preview;

@@ -1,0 +1,171 @@
+//! The pages of every verb that writes one: whole, quiet, sortable, dark where that is asked for, and no wider than a phone.
+
+use super::chromium::tab;
+use super::tab::Tab;
+use crate::cli::folder::Folder;
+
+/// Small windows: of a desk and of a phone.
+const DESK: [u32; 2] = [1200, 900];
+const PHONE: [u32; 2] = [360, 740];
+
+/// Runs commands, the last of which writes `page.html`, and looks at that.
+#[track_caller]
+fn look(commands: &[&str]) -> Option<(Folder, Tab)> {
+    let mut tab = tab()?;
+    let folder = Folder::new();
+    for command in commands {
+        folder.run(command).succeeds();
+    }
+    tab.open(&folder.path().join("page.html"));
+    tab.eval("document.querySelectorAll('details').forEach((d) => (d.open = true))");
+    tab.wait_for(
+        "[...document.querySelectorAll('[data-viewer]')].every((v) => v.dataset.ready === 'true')",
+        20.0,
+    );
+    Some((folder, tab))
+}
+
+/// What holds of any page.
+#[track_caller]
+fn examine(tab: &mut Tab) {
+    tab.assert_clean();
+    let pictures = "[...document.images].filter((i) => !(i.complete && i.naturalWidth > 0 && i.alt)).length";
+    assert_eq!(tab.eval(pictures), 0, "pictures that are none");
+    assert_charts(tab);
+    assert_sorts(tab);
+    assert_looks(tab);
+    tab.assert_clean();
+}
+
+/// Charts have a size, and nothing of them leaves it.
+#[track_caller]
+fn assert_charts(tab: &mut Tab) {
+    let bad = tab.eval(
+        "[...document.querySelectorAll('svg')].filter((s) => {
+          const b = s.getBoundingClientRect();
+          const drawn = s.querySelector('polyline') || s.querySelector('rect');
+          return !(b.width > 20 && b.height > 10 && drawn && s.getBBox().width <= b.width * 40);
+        }).map((s) => s.outerHTML.slice(0, 300))",
+    );
+    assert_eq!(bad, serde_json::json!([]), "charts without a size");
+    // Someone's longest bar fills its chart.
+    let short = tab.eval(
+        "[...document.querySelectorAll('.bars')].filter((b) => ![...b.querySelectorAll('svg')].some((s) => {
+          const ends = [...s.querySelectorAll('rect, line')].map((e) => e.getBoundingClientRect().right);
+          return Math.abs(Math.max(...ends) - s.getBoundingClientRect().right) < 2;
+        })).length",
+    );
+    assert_eq!(short, 0, "charts of bars that none fills");
+}
+
+/// Every column of every table sorts both ways: by the mouse in the first, by the keyboard in the others.
+#[track_caller]
+fn assert_sorts(tab: &mut Tab) {
+    let js = "[...document.querySelectorAll('table')].map((t, i) => { t.id = `t${i}`; return t.tHead.rows[0].cells.length; })";
+    let columns = tab.eval(js);
+    for (i, columns) in columns.as_array().into_iter().flatten().enumerate() {
+        for column in 1..=columns.as_u64().expect("a count") {
+            let button = format!("#t{i} th:nth-child({column}) button");
+            for direction in ["ascending", "descending"] {
+                if column == 1 {
+                    tab.click(&button);
+                } else {
+                    tab.eval(&format!("document.querySelector('{button}').focus()"));
+                    tab.key(if direction == "ascending" { "Enter" } else { " " });
+                }
+                let told = tab.eval(&format!(
+                    "[...document.querySelectorAll('#t{i} th')].map((h) => h.getAttribute('aria-sort'))"
+                ));
+                let told = told.as_array().expect("a list");
+                assert_eq!(told[column as usize - 1], direction, "{button}");
+                assert_eq!(told.iter().filter(|t| !t.is_null()).count(), 1, "{button}: {told:?}");
+                let unsorted = tab.eval(&format!(
+                    "(() => {{
+                      const cells = [...document.querySelector('#t{i}').tBodies[0].rows].map((r) => r.cells[{column} - 1]);
+                      const values = cells.filter((c) => 'value' in c.dataset).map((c) => Number(c.dataset.value));
+                      // Numbers first, whichever way.
+                      const parted = cells.slice(0, values.length).every((c) => 'value' in c.dataset);
+                      const sign = '{direction}' === 'ascending' ? 1 : -1;
+                      const bad = values.filter((v, k) => k > 0 && sign * (v - values[k - 1]) < 0);
+                      return parted ? bad : cells.map((c) => c.textContent);
+                    }})()"
+                ));
+                assert_eq!(unsorted, serde_json::json!([]), "{button} {direction}");
+            }
+        }
+    }
+}
+
+/// Dark where the system is, and on a phone no wider than its window.
+#[track_caller]
+fn assert_looks(tab: &mut Tab) {
+    let light = tab.shot().at([4.0, 4.0]);
+    tab.emulate(true, DESK[0], DESK[1], false);
+    let dark = tab.shot().at([4.0, 4.0]);
+    let sum = |c: [u8; 3]| c.map(u32::from).iter().sum::<u32>();
+    assert!(sum(light) > 600 && sum(dark) < 150, "{light:?}, {dark:?}");
+    for [width, height] in [PHONE, [DESK[0], DESK[1]], [PHONE[1], PHONE[0]]] {
+        tab.emulate(false, width, height, width < 800);
+        tab.settle();
+        // A wider page would be laid out on a wider window.
+        let wide = tab.eval(
+            "[document.scrollingElement.scrollWidth, innerWidth, [...document.querySelectorAll('main *')].filter((e) =>
+              e.getBoundingClientRect().right > document.documentElement.clientWidth + 1 && !e.closest('.scroll') && !e.closest('svg')).map((e) => e.outerHTML.slice(0, 120))]",
+        );
+        assert_eq!(wide[1], width, "{wide}");
+        assert!(wide[0].as_u64() <= Some(width.into()), "{width}: {wide}");
+        assert_eq!(wide[2], serde_json::json!([]), "{width}: what leaves the page");
+    }
+}
+
+#[track_caller]
+fn counts(tab: &mut Tab, selector: &str, least: u64) {
+    let n = tab.eval(&format!("document.querySelectorAll('{selector}').length"));
+    assert!(n.as_u64() >= Some(least), "{n} of {selector}, wanted {least}");
+}
+
+#[test]
+fn of_crosscheck() {
+    let Some((_folder, mut tab)) = look(&["crosscheck scene.toml --spp 2 --html page.html"]) else { return };
+    counts(&mut tab, "img, [data-viewer]", 1);
+    counts(&mut tab, "table", 1);
+    examine(&mut tab);
+}
+
+#[test]
+fn of_bench_rays() {
+    let rays = "bench rays scene.toml --count 500 --rounds 2 --threads 1 --backend brute --form single,batch \
+                --html page.html --quiet";
+    let Some((_folder, mut tab)) = look(&[rays]) else { return };
+    counts(&mut tab, ".bars svg rect", 4);
+    examine(&mut tab);
+}
+
+#[test]
+fn of_bench_error() {
+    let error = "bench error scene.toml --size 24x16 --spp 2,4 --replicates 2 --reference-spp 64 \
+                 -L sampler=owen-sobol,independent --html page.html";
+    let Some((_folder, mut tab)) = look(&[error]) else { return };
+    counts(&mut tab, "svg.lines polyline", 2);
+    examine(&mut tab);
+}
+
+#[test]
+fn of_check() {
+    let Some((_folder, mut tab)) = look(&["check tri.ply --rays 300 --html page.html"]) else { return };
+    counts(&mut tab, "table", 1);
+    examine(&mut tab);
+}
+
+#[test]
+fn of_compare() {
+    let renders = [
+        "render scene.toml -o a.exr --seed 0",
+        "render scene.toml -o b.exr --seed 1",
+        "render scene.toml -o c.exr --seed 2",
+        "compare a.exr b.exr c.exr --html page.html",
+    ];
+    let Some((_folder, mut tab)) = look(&renders) else { return };
+    counts(&mut tab, "[data-viewer]", 1);
+    examine(&mut tab);
+}
