@@ -103,7 +103,8 @@ class Viewer {
   resize() {
     const stage = this.canvas.parentElement;
     stage.style.setProperty("--ideal", `${Math.round((stage.clientWidth * this.height) / this.width)}px`);
-    const box = stage.getBoundingClientRect(), dpr = window.devicePixelRatio || 1;
+    // Of the canvas, not of the stage, whose border would stretch it by two pixels.
+    const box = this.canvas.getBoundingClientRect(), dpr = window.devicePixelRatio || 1;
     const fitted = this.state.scale === 0 || Math.abs(this.state.scale - (this.fitted ?? 0)) < 1e-9;
     this.box = [box.width, box.height];
     this.canvas.width = Math.max(1, Math.round(box.width * dpr));

@@ -3,3 +3,4 @@
 mod chromium;
 mod reports;
 mod tab;
+mod viewer;
