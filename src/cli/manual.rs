@@ -33,10 +33,10 @@ pub fn man(args: &ManArgs) -> Result<()> {
     let (mut page, mut full_name) = (whole, String::from("skylit"));
     for name in &args.verbs {
         let Some(verb) = page.find_subcommand(name).cloned() else {
-            let known = page.get_subcommands().map(clap::Command::get_name);
+            let known = page.get_subcommands().filter(|c| !c.is_hide_set()).map(clap::Command::get_name);
             return Err(Error::Usage(match page.has_subcommands() {
                 true => unknown_name("verb", name, known),
-                false => format!("{full_name} has no verbs of its own, such as \"{name}\""),
+                false => format!("\"{}\" has no verbs of its own, such as \"{name}\"", args.verbs.join(" ")),
             }));
         };
         page = verb;

@@ -6,6 +6,8 @@ use std::fmt::Write;
 
 /// U+2580, the upper half.
 const UPPER: char = '\u{2580}';
+/// U+2584, the lower half.
+const LOWER: char = '\u{2584}';
 
 /// A row of text for every two rows of dots, without line ends.
 pub fn lines(dots: &Dots, true_colour: bool) -> Vec<String> {
@@ -18,16 +20,18 @@ pub fn lines(dots: &Dots, true_colour: bool) -> Vec<String> {
         for (i, dot) in upper.iter().enumerate() {
             let pair = (*dot, lower.and_then(|row| row[i]));
             if last != Some(pair) {
-                colour(&mut line, 38, pair.0, true_colour);
-                colour(&mut line, 48, pair.1, true_colour);
+                let (letter, ground) = if pair.0.is_some() { pair } else { (pair.1, pair.0) };
+                colour(&mut line, 38, letter, true_colour);
+                colour(&mut line, 48, ground, true_colour);
                 last = Some(pair);
             }
-            // Nothing above is a gap, not half a letter in the terminal's own colour.
-            match pair {
-                (Some(_), _) => line.push(UPPER),
-                (None, Some(_)) => line.push('\u{2584}'),
-                (None, None) => line.push(' '),
-            }
+            // Halves of one colour need no letter, whose edges some fonts leave open. What is not known is a gap, not half
+            // a letter in the terminal's own colour.
+            line.push(match pair {
+                (upper, lower) if upper == lower => ' ',
+                (Some(_), _) => UPPER,
+                (None, _) => LOWER,
+            });
         }
         line.push_str("\x1b[0m");
         out.push(line);

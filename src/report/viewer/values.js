@@ -95,7 +95,7 @@ function shade(picture, [w, h], look, stride) {
   return paint(w, h, stride, (i, out, o) => {
     let r = picture[3 * i], g = picture[3 * i + 1], b = picture[3 * i + 2];
     if (asStored) {
-      out[o] = 255 * r + 0.5; out[o + 1] = 255 * g + 0.5; out[o + 2] = 255 * b + 0.5;
+      out[o] = 255 * r; out[o + 1] = 255 * g; out[o + 2] = 255 * b;
       return;
     }
     if (!(Number.isFinite(r) && Number.isFinite(g) && Number.isFinite(b))) {

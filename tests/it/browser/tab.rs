@@ -1,6 +1,6 @@
 //! A tab with a page, and what people do with it.
 
-use super::chromium::{Connection, PATIENCE};
+use super::chromium::Connection;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};

@@ -1,6 +1,6 @@
 //! `skylit compare`: figures of files, limits and exit codes, folders, and what cannot be compared.
 
-use super::folder::{Folder, QUICK};
+use super::folder::Folder;
 use serde_json::Value;
 
 /// A scene's picture as `a.exr` and `a.png`, and with another seed as `b.exr` and `b.png`.
@@ -119,7 +119,7 @@ fn folders_are_compared_by_name() {
 #[test]
 fn what_cannot_be_compared_is_one_clear_line() {
     let f = renders();
-    f.run(&format!("render tri.ply -o small.exr {QUICK} --size 4x3")).succeeds();
+    f.run("render scene.toml -o small.exr --size 4x3").succeeds();
     f.refuses("compare a.exr small.exr", 2, &["small.exr: is 4x3", "a.exr is 8x6", "0.500 times"]);
     f.refuses("compare a.exr nothing.exr", 3, &["nothing.exr", "open"]);
     let whole = std::fs::read(f.path().join("a.exr")).unwrap();

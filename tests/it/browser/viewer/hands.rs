@@ -24,7 +24,7 @@ fn every_key_does_what_the_help_says() {
         ("1", "test", json!(1)),
         ("9", "test", json!(2)),
         ("e", "exposure", json!(0.5)),
-        ("E", "exposure", json!(0.0)),
+        ("E", "exposure", json!(0)),
         ("E", "exposure", json!(-0.5)),
         ("t", "tonemap", json!("reinhard")),
         ("t", "tonemap", json!("aces-fit")),

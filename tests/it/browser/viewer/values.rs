@@ -153,7 +153,7 @@ fn a_wipe_parts_the_reference_from_the_test() {
     let pixels = page.pixels();
     let [left, _, wide, _] = pixels.stage;
     // The first row and the last ones lie under names and the slider.
-    let mut check = |page: &mut Page, part: f64| {
+    let check = |page: &mut Page, part: f64| {
         let shot = page.tab.shot();
         let divider = left + part * wide;
         let wanted = |x, y| {
