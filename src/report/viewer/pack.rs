@@ -124,7 +124,8 @@ impl Shared {
 
     /// The nearest; what the format does not hold is cut to its range.
     pub fn of(rgb: [f32; 3]) -> Shared {
-        let rgb = rgb.map(|v| v.max(0.0).min(Shared::LARGEST));
+        // No number is 0, too.
+        let rgb = rgb.map(|v| if v > 0.0 { v.min(Shared::LARGEST) } else { 0.0 });
         let largest = rgb[0].max(rgb[1]).max(rgb[2]);
         let power = (largest.to_bits() >> 23) as i32 - 127;
         let mut exponent = power.max(-16) + 16;
