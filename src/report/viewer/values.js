@@ -94,13 +94,14 @@ function shade(picture, [w, h], look, stride) {
   const asStored = look.encoded && plain && look.exposure === 0;
   return paint(w, h, stride, (i, out, o) => {
     let r = picture[3 * i], g = picture[3 * i + 1], b = picture[3 * i + 2];
-    if (asStored) {
-      out[o] = 255 * r; out[o + 1] = 255 * g; out[o + 2] = 255 * b;
-      return;
-    }
     if (!(Number.isFinite(r) && Number.isFinite(g) && Number.isFinite(b))) {
       // No number has a colour that no picture has.
       out[o] = 255; out[o + 1] = 0; out[o + 2] = 255;
+      return;
+    }
+    if (asStored) {
+      // The canvas rounds by itself.
+      out[o] = 255 * r; out[o + 1] = 255 * g; out[o + 2] = 255 * b;
       return;
     }
     if (look.encoded) [r, g, b] = [toLinear(r), toLinear(g), toLinear(b)];
