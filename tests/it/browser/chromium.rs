@@ -37,7 +37,9 @@ const FLAGS: [&str; 14] = [
 
 /// Runs "$@" until standard input ends, which it does when the tests' process does, in whatever way; then nothing is left.
 const LEASH: &str = r#"profile="$1"; shift; "$@" </dev/null >/dev/null 2>"$profile/log" & browser=$!
-cat >/dev/null; kill "$browser"; wait "$browser"; rm -rf "$profile""#;
+cat >/dev/null; kill "$browser"; wait "$browser"
+# Its children end a little later, and may write until then.
+for _ in 1 2 3 4 5 6 7 8 9 10; do rm -rf "$profile" 2>/dev/null && break; sleep 0.2; done"#;
 
 /// Where the browser itself is asked; none where no browser is installed.
 static BROWSER: LazyLock<Option<Browser>> = LazyLock::new(|| program().map(Browser::launch));
@@ -49,14 +51,15 @@ struct Browser {
     _shell: Child,
 }
 
-/// What `SKYLIT_BROWSER` names, else the first of [`NAMES`] in the PATH.
+/// What `SKYLIT_BROWSER` names, by its path or as the PATH has it, else the first of [`NAMES`].
 fn program() -> Option<PathBuf> {
-    if let Some(named) = std::env::var_os("SKYLIT_BROWSER") {
-        return Some(named.into());
-    }
-    let folders = std::env::var_os("PATH")?;
-    let mut all = std::env::split_paths(&folders).flat_map(|f| NAMES.map(|n| f.join(n)));
-    all.find(|p| p.is_file())
+    let named = std::env::var_os("SKYLIT_BROWSER");
+    let names = named.as_ref().map_or_else(|| NAMES.map(Into::into).to_vec(), |n| vec![n.clone()]);
+    let folders = std::env::var_os("PATH").unwrap_or_default();
+    let mut all = std::env::split_paths(&folders).flat_map(|f| names.iter().map(move |n| f.join(n)));
+    let found = all.find(|p| p.is_file());
+    assert!(named.is_none() || found.is_some(), "SKYLIT_BROWSER is {named:?}, and there is no such program");
+    found
 }
 
 impl Browser {
@@ -67,6 +70,9 @@ impl Browser {
         let mut shell = Command::new("sh");
         shell.args(["-c", LEASH, "sh"]).arg(&profile).arg(&program).args(FLAGS);
         shell.arg(format!("--user-data-dir={}", profile.display())).arg("about:blank");
+        // What ends the tests from a terminal shall not end the shell before it has cleaned up.
+        #[cfg(unix)]
+        std::os::unix::process::CommandExt::process_group(&mut shell, 0);
         let mut shell =
             shell.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
         let leash = shell.stdin.take().expect("piped");
