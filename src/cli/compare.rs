@@ -178,11 +178,12 @@ pub fn run(args: &CompareArgs, setting: &Setting) -> Result<()> {
     for [given, test_given] in &pairs {
         // Of several pictures of one scene the first stands for all where figures are taken.
         let [reference, test] = &[given, test_given].map(|g| args.statistical.files(g).swap_remove(0));
-        let source = match kept.take().filter(|k| k.path == *reference) {
-            Some(source) => source,
-            None => Source::read(reference, &options.load)?,
-        };
-        let test = Source::read(test, &options.load)?;
+        let source = kept.take().filter(|k| k.path == *reference);
+        let (source, test) = rayon::join(
+            || source.map_or_else(|| Source::read(reference, &options.load), Ok),
+            || Source::read(test, &options.load),
+        );
+        let (source, test) = (source?, test?);
         let compare_options = options.of(&source)?;
         let (comparison, pair) = compare(&source, &test, &compare_options)?;
         if args.statistical.statistical {

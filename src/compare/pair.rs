@@ -1,6 +1,6 @@
 //! Two pictures of equal size, brought into one space, with the pixels that count.
 
-use crate::color::{linear_to_srgb, srgb_to_linear};
+use crate::color::linear_to_srgb;
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
@@ -131,24 +131,20 @@ impl Pair {
         self.display[side as usize].get_or_init(|| curved(self.planes(side), linear_to_srgb))
     }
 
-    /// Colours as a display shows them, pixel by pixel. None where channels are no colours.
-    pub fn display(&self, side: Side) -> Option<Vec<[f32; 3]>> {
-        self.is_color.then(|| self.pixels_of(self.display_planes(side)))
+    /// Red, green and blue as a display shows them; one plane three times where there is but one. None where channels are no
+    /// colours.
+    pub fn display_colors(&self, side: Side) -> Option<[&[f32]; 3]> {
+        self.is_color.then(|| three(self.display_planes(side)))
     }
 
-    /// Colours as radiance, pixel by pixel. None where channels are no colours.
-    pub fn linear(&self, side: Side) -> Option<Vec<[f32; 3]>> {
-        match self.space {
-            _ if !self.is_color => None,
-            Space::Linear => Some(self.pixels_of(self.planes(side))),
-            Space::Display => Some(self.pixels_of(&curved(self.planes(side), srgb_to_linear))),
-        }
+    /// Red, green and blue in the pair's own space, likewise.
+    pub fn colors(&self, side: Side) -> Option<[&[f32]; 3]> {
+        self.is_color.then(|| three(self.planes(side)))
     }
+}
 
-    fn pixels_of(&self, planes: &Planes) -> Vec<[f32; 3]> {
-        let [r, g, b] = [0, 1, 2].map(|c| &planes[c.min(planes.len() - 1)]);
-        (0..self.pixels()).into_par_iter().with_min_len(CHUNK).map(|i| [r[i], g[i], b[i]]).collect()
-    }
+fn three(planes: &Planes) -> [&[f32]; 3] {
+    [0, 1, 2].map(|c| &planes[c.min(planes.len() - 1)][..])
 }
 
 fn curved(planes: &Planes, curve: fn(f32) -> f32) -> Planes {

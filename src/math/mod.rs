@@ -7,6 +7,7 @@ pub mod frame;
 pub mod pages;
 pub mod polygon;
 pub mod quadric;
+pub mod rank;
 pub mod simd;
 pub mod triangle;
 pub mod trig;

@@ -1,5 +1,6 @@
 //! FLIP over one tile: what fits in a core's cache, for every exposure while it is there.
 
+use super::Planes;
 use super::colour::{Colours, amplified, decode, unit};
 use super::convolve::{AlongColumns, AlongRows, DetectColumns, DetectRows, Source};
 use super::kernels::Kernels;
@@ -24,7 +25,7 @@ pub(super) enum Display<'a> {
 pub(super) struct Pair<'a> {
     pub size: [usize; 2],
     /// Reference and test.
-    pub pictures: [&'a [[f32; 3]]; 2],
+    pub pictures: [Planes<'a>; 2],
     pub display: Display<'a>,
     pub kernels: &'a Kernels,
     pub colours: &'a Colours,
@@ -75,7 +76,8 @@ impl Scratch {
         self.stride = (self.width + 2 * self.margin).next_multiple_of(LANES);
         for (planes, picture) in self.stored.iter_mut().zip(pair.pictures) {
             let window = Window { at: [x, y], margin: self.margin, stride: self.stride };
-            window.gather(pair.size, picture, self.height + 2 * self.margin, planes);
+            sized(planes, (self.height + 2 * self.margin) * self.stride);
+            planes.iter_mut().zip(picture).for_each(|(to, from)| window.gather(pair.size, from, to));
         }
         let area = self.width * self.height;
         self.found.errors.clear();
@@ -183,17 +185,19 @@ struct Window {
 }
 
 impl Window {
-    /// Its planes; beyond the edges of the picture stand the pixels of the edge.
-    fn gather(&self, size: [usize; 2], picture: &[[f32; 3]], rows: usize, planes: &mut [Vec<f32>; 3]) {
-        let [r, g, b] = sized(planes, rows * self.stride);
-        let rows = r.chunks_exact_mut(self.stride).zip(g.chunks_exact_mut(self.stride));
-        let inside = |at: usize, i: usize, n: usize| (at + i).saturating_sub(self.margin).min(n - 1);
-        for (y, ((r, g), b)) in rows.zip(b.chunks_exact_mut(self.stride)).enumerate() {
-            let y = inside(self.at[1], y, size[1]);
-            let row = &picture[y * size[0]..][..size[0]];
-            for (x, ((r, g), b)) in r.iter_mut().zip(g).zip(b).enumerate() {
-                [*r, *g, *b] = row[inside(self.at[0], x, size[0])];
-            }
+    /// One of its planes; beyond the edges of the picture stand the pixels of the edge.
+    fn gather(&self, [w, h]: [usize; 2], plane: &[f32], out: &mut [f32]) {
+        let [left, top] = self.at;
+        let first = left.saturating_sub(self.margin);
+        // Columns beyond the left edge, and those that the picture has.
+        let outside = self.margin - (left - first);
+        let inside = (self.stride - outside).min(w - first);
+        for (y, out) in out.chunks_exact_mut(self.stride).enumerate() {
+            let y = (top + y).saturating_sub(self.margin).min(h - 1);
+            let row = &plane[y * w..][..w];
+            out[..outside].fill(row[0]);
+            out[outside..outside + inside].copy_from_slice(&row[first..first + inside]);
+            out[outside + inside..].fill(row[w - 1]);
         }
     }
 }

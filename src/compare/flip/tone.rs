@@ -1,8 +1,11 @@
 //! Exposures and tone curves of HDR-FLIP: Andersson et al. 2021, "Visualizing Errors in Rendered High Dynamic Range
 //! Images", section 3.
 
+use super::Planes;
 use super::colour::unit;
 use crate::error::{Error, Result};
+use crate::math::rank;
+use rayon::prelude::*;
 
 /// How radiance is shown before it is compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -105,45 +108,36 @@ impl Default for HdrOptions {
 /// More exposures than this are a mistake: f32 has 277 stops.
 pub const MAX_EXPOSURES: u32 = 1000;
 
-/// The exposures of a comparison, in stops.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Exposures {
-    pub start: f32,
-    pub stop: f32,
-    pub all: Vec<f32>,
-}
-
-impl Exposures {
-    /// Those asked for, else by the reference picture. Its luminances below 2^-23 count as that where they are the largest
-    /// or the median, so that a black reference has exposures, too: the reference implementation refuses one.
-    pub fn new(options: &HdrOptions, reference: &[[f32; 3]]) -> Result<Self> {
-        let usage = |message: String| Err(Error::Usage(message));
-        let (mut start, mut stop) = (options.start, options.stop);
-        if let Some(bad) = [start, stop].into_iter().flatten().find(|e| e.is_nan() || e.abs() > 128.0) {
-            return usage(format!("exposures of HDR-FLIP are from -128 to 128 stops, not {bad}"));
-        }
-        if start.is_none() || stop.is_none() {
-            let bright = options.tone_mapper.bright();
-            let mut luminances: Vec<f32> = reference.iter().map(|p| luminance(*p)).collect();
-            let middle = luminances.len() / 2;
-            let (_, median, above) = luminances.select_nth_unstable_by(middle, f32::total_cmp);
-            let median = median.max(f32::EPSILON);
-            let largest = above.iter().fold(median, |a, b| a.max(*b));
-            let stops = |luminance: f32| f64::from(bright / luminance).log2() as f32;
-            let both = [stops(largest), stops(median)];
-            start = start.or_else(|| Some(stop.map_or(both[0], |stop| both[0].min(stop))));
-            stop = stop.or_else(|| start.map(|start| both[1].max(start)));
-        }
-        let (start, stop) = (start.unwrap_or_default(), stop.unwrap_or_default());
-        if start > stop {
-            return usage(format!("HDR-FLIP's first exposure of {start} is above its last, {stop}"));
-        }
-        let count = options.exposures.unwrap_or(((stop - start).ceil() as u32).max(2));
-        if !(1..=MAX_EXPOSURES).contains(&count) {
-            return usage(format!("HDR-FLIP takes from 1 to {MAX_EXPOSURES} exposures, not {count}"));
-        }
-        // The reference implementation divides by zero where there is but one.
-        let step = if count > 1 { (stop - start) / (count - 1) as f32 } else { 0.0 };
-        Ok(Exposures { start, stop, all: (0..count).map(|i| start + i as f32 * step).collect() })
+/// The exposures of a comparison, in stops, evenly from the first to the last: those asked for, else by the reference
+/// picture. Its luminances below 2^-23 count as that where they are the largest or the median, so that a black reference has
+/// exposures, too: the reference implementation refuses one.
+pub(super) fn exposures(options: &HdrOptions, reference: Planes) -> Result<Vec<f32>> {
+    let usage = |message: String| Err(Error::Usage(message));
+    let (mut start, mut stop) = (options.start, options.stop);
+    if let Some(bad) = [start, stop].into_iter().flatten().find(|e| e.is_nan() || e.abs() > 128.0) {
+        return usage(format!("exposures of HDR-FLIP are from -128 to 128 stops, not {bad}"));
     }
+    if start.is_none() || stop.is_none() {
+        let bright = options.tone_mapper.bright();
+        let [r, g, b] = reference;
+        let of = |i: usize| luminance([r[i], g[i], b[i]]);
+        let luminances: Vec<f32> = (0..r.len()).into_par_iter().with_min_len(1 << 14).map(of).collect();
+        let median = rank::nth(&luminances, luminances.len() / 2).max(f32::EPSILON);
+        let largest = luminances.par_iter().copied().reduce(|| median, f32::max);
+        let stops = |luminance: f32| f64::from(bright / luminance).log2() as f32;
+        let both = [stops(largest), stops(median)];
+        start = start.or_else(|| Some(stop.map_or(both[0], |stop| both[0].min(stop))));
+        stop = stop.or_else(|| start.map(|start| both[1].max(start)));
+    }
+    let (start, stop) = (start.unwrap_or_default(), stop.unwrap_or_default());
+    if start > stop {
+        return usage(format!("HDR-FLIP's first exposure of {start} is above its last, {stop}"));
+    }
+    let count = options.exposures.unwrap_or(((stop - start).ceil() as u32).max(2));
+    if !(1..=MAX_EXPOSURES).contains(&count) {
+        return usage(format!("HDR-FLIP takes from 1 to {MAX_EXPOSURES} exposures, not {count}"));
+    }
+    // The reference implementation divides by zero where there is but one.
+    let step = if count > 1 { (stop - start) / (count - 1) as f32 } else { 0.0 };
+    Ok((0..count).map(|i| start + i as f32 * step).collect())
 }

@@ -14,12 +14,13 @@ pub const METRIC: Metric = Metric {
     better: Better::Lower,
     unit: "",
     eval: |input| {
-        let [Some(reference), Some(test)] = [Side::Reference, Side::Test].map(|s| input.pair.display(s))
+        let [Some(reference), Some(test)] =
+            [Side::Reference, Side::Test].map(|s| input.pair.display_colors(s))
         else {
             return Err(no_colors());
         };
         let ppd = input.options.pixels_per_degree;
-        let found = ldr(input.pair.size, &reference, &test, ppd).map_err(|e| Skipped(e.to_string()))?;
+        let found = ldr(input.pair.size, reference, test, ppd).map_err(|e| Skipped(e.to_string()))?;
         Ok(outcome(input, found.map, format!("{ppd:.2} pixels a degree, {}", on_display(input))))
     },
 };

@@ -17,13 +17,15 @@ pub const METRIC: Metric = Metric {
         if input.pair.space == Space::Display {
             return Err(Skipped("the values are encoded for a display: FLIP is for them".into()));
         }
-        let [Some(reference), Some(test)] = [Side::Reference, Side::Test].map(|s| input.pair.linear(s))
+        let [Some(reference), Some(test)] = [Side::Reference, Side::Test].map(|s| input.pair.colors(s))
         else {
             return Err(no_colors());
         };
         let options = HdrOptions { ppd: input.options.pixels_per_degree, ..HdrOptions::default() };
-        let found = hdr(input.pair.size, &reference, &test, &options).map_err(|e| Skipped(e.to_string()))?;
-        let note = format!("{} exposures from {:+.2} to {:+.2} stops", found.count, found.start, found.stop);
+        let found = hdr(input.pair.size, reference, test, &options).map_err(|e| Skipped(e.to_string()))?;
+        let (first, last) = (found.exposures.first(), found.exposures.last());
+        let [first, last] = [first, last].map(|e| e.copied().unwrap_or_default());
+        let note = format!("{} exposures from {first:+.2} to {last:+.2} stops", found.exposures.len());
         Ok(outcome(input, found.map, note))
     },
 };

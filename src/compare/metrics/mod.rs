@@ -14,6 +14,7 @@ mod psnr;
 mod relmse;
 mod relmse_trimmed;
 mod rmse;
+mod similarity;
 mod smape;
 mod ssim;
 #[cfg(test)]
@@ -22,6 +23,7 @@ mod tests;
 use super::pair::{Pair, Side, Space};
 use crate::error::{Error, Result, unknown_name};
 use crate::math::exact_sum::ExactSum;
+use similarity::Similarity;
 use std::sync::OnceLock;
 
 /// Which way a figure is better.
@@ -78,6 +80,7 @@ pub struct Input<'a> {
     maps: bool,
     level: OnceLock<f64>,
     squares: OnceLock<Vec<f64>>,
+    similarity: OnceLock<Result<Similarity<'a>, Skipped>>,
 }
 
 /// Choices of the measures.
@@ -110,7 +113,8 @@ impl Default for MetricOptions {
 impl<'a> Input<'a> {
     /// For [`Metric::eval`].
     pub fn new(pair: &'a Pair, options: &'a MetricOptions) -> Self {
-        Input { pair, options, maps: false, level: OnceLock::new(), squares: OnceLock::new() }
+        let (level, squares, similarity) = Default::default();
+        Input { pair, options, maps: false, level, squares, similarity }
     }
 
     /// With maps, or without.
@@ -121,6 +125,11 @@ impl<'a> Input<'a> {
     /// Mean squared errors by channel.
     pub fn squares(&self) -> &[f64] {
         self.squares.get_or_init(|| pointwise::means(self.pair, |r, t| (t - r).powi(2)))
+    }
+
+    /// Structural similarity at full resolution; none where the picture is too small.
+    fn similarity(&self) -> Result<&Similarity<'a>, Skipped> {
+        self.similarity.get_or_init(|| Similarity::new(self)).as_ref().map_err(Clone::clone)
     }
 
     /// The reference's mean luminance.

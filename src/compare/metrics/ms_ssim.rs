@@ -1,8 +1,6 @@
 //! Structural similarity at several scales.
 
-use super::ssim::Seen;
-use super::{Better, Metric, Outcome, Skipped};
-use crate::compare::ssim::{Options, ms_ssim};
+use super::{Better, Metric, Outcome};
 
 /// The row of the table.
 pub const METRIC: Metric = Metric {
@@ -13,20 +11,12 @@ pub const METRIC: Metric = Metric {
     better: Better::Higher,
     unit: "",
     eval: |input| {
-        let seen = Seen::new(input);
-        let options = Options::new(seen.range);
-        let [w, h] = input.pair.size;
-        let mut out = Outcome::default();
-        let mut scales = 0;
-        for (a, b) in seen.planes[0].iter().zip(seen.planes[1].iter()) {
-            let small = || Skipped(format!("{w}x{h} pixels are less than its window of 11"));
-            let found = ms_ssim([w, h], a, b, &options).ok_or_else(small)?;
-            out.channels.push(found.value);
-            scales = found.scales;
-        }
-        out.value = out.channels.iter().sum::<f64>() / out.channels.len().max(1) as f64;
+        let similarity = input.similarity()?;
+        let found = similarity.scales();
+        let channels: Vec<f64> = found.iter().map(|f| f.value).collect();
+        let value = channels.iter().sum::<f64>() / channels.len().max(1) as f64;
+        let scales = found.first().map_or(0, |f| f.scales);
         let unit = if scales == 1 { "scale" } else { "scales" };
-        out.note = format!("{}, {scales} {unit}", seen.note);
-        Ok(out)
+        Ok(Outcome { value, channels, note: format!("{}, {scales} {unit}", similarity.note), map: None })
     },
 };

@@ -56,6 +56,27 @@ pub fn map(pair: &Pair, error: impl Fn(f64, f64) -> f64 + Sync) -> Vec<f32> {
     out
 }
 
+/// Values of the pixels that count.
+pub fn counted(pair: &Pair, map: Vec<f32>) -> Vec<f32> {
+    match &pair.counted {
+        None => map,
+        Some(counted) => map.into_iter().zip(counted).filter(|(_, c)| **c).map(|(v, _)| v).collect(),
+    }
+}
+
+/// How many values are below a limit, and their sum.
+pub fn sum_below(values: &[f32], limit: f32) -> (usize, f64) {
+    let parts = values.par_chunks(CHUNK).map(|part| {
+        let below = part.iter().filter(|v| **v < limit);
+        (below.clone().count(), below.map(|v| f64::from(*v)).collect::<ExactSum>())
+    });
+    let (count, sum) = parts.reduce(Default::default, |(n, mut a), (m, b)| {
+        a.merge(b);
+        (n + m, a)
+    });
+    (count, sum.value())
+}
+
 /// The usual figure: means by channel, and the mean of these.
 pub fn outcome(input: &Input, note: String, error: impl Fn(f64, f64) -> f64 + Sync) -> Outcome {
     let channels = means(input.pair, &error);

@@ -12,6 +12,7 @@ mod tests;
 use crate::math::exact_sum::ExactSum;
 use moments::{TILE, Tile};
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// What the moments are taken under.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -93,7 +94,7 @@ pub fn ssim(size: [usize; 2], a: &[f32], b: &[f32], options: &Options, wants_map
         .collect();
     let of_tile = |at: &[usize; 2]| {
         let tile = Tile { size, at: *at, planes: [a, b], weights: &weights, norm, constants };
-        tile.similarity(radius)
+        tile.similarity(radius, wants_map)
     };
     let parts: Vec<_> = tiles.par_iter().map(of_tile).collect();
     let (mut sum, mut structure) = (ExactSum::default(), ExactSum::default());
@@ -129,24 +130,23 @@ pub struct MsSsim {
 
 /// Similarity at up to five scales, each of half the resolution of the one before (means of 2 x 2 pixels; a last odd row or
 /// column is left out): structure at all of them, brightness at the coarsest. A negative mean counts as 0, as a power needs
-/// it. None where a side is shorter than the window.
-pub fn ms_ssim(size: [usize; 2], a: &[f32], b: &[f32], options: &Options) -> Option<MsSsim> {
+/// it. `finest` is what [`ssim`] finds of the planes as they are. None where a side is shorter than the window.
+pub fn ms_ssim(size: [usize; 2], planes: [&[f32]; 2], options: &Options, finest: &Ssim) -> Option<MsSsim> {
     let least = 2 * options.window.radius() + 1;
     let scales = (0..SCALES.len()).take_while(|s| size.iter().all(|n| n >> s >= least)).count();
     let total: f64 = SCALES[..scales].iter().sum();
-    let mut planes = [std::borrow::Cow::Borrowed(a), std::borrow::Cow::Borrowed(b)];
-    let (mut size, mut value) = (size, 1.0);
-    for (scale, weight) in SCALES[..scales].iter().enumerate() {
-        let found = ssim(size, &planes[0], &planes[1], options, false)?;
-        let last = scale + 1 == scales;
-        let factor = if last { found.mean } else { found.structure };
-        value *= factor.max(0.0).powf(weight / total);
-        if !last {
-            planes = planes.map(|p| halved(size, &p).into());
-            size = size.map(|n| n / 2);
-        }
+    let factor = |scale: usize, found: &Ssim| {
+        let mean = if scale + 1 == scales { found.mean } else { found.structure };
+        mean.max(0.0).powf(SCALES[scale] / total)
+    };
+    let mut value = (scales > 0).then(|| factor(0, finest))?;
+    let (mut size, mut planes) = (size, planes.map(Cow::Borrowed));
+    for scale in 1..scales {
+        planes = planes.map(|p| halved(size, &p).into());
+        size = size.map(|n| n / 2);
+        value *= factor(scale, &ssim(size, &planes[0], &planes[1], options, false)?);
     }
-    (scales > 0).then_some(MsSsim { value, scales })
+    Some(MsSsim { value, scales })
 }
 
 /// Means of 2 x 2 pixels.

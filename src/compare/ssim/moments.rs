@@ -31,7 +31,7 @@ pub(super) struct Tile<'a> {
 pub(super) struct Part {
     /// For each row, sums of similarity and of its structure over pixels whose window lies inside of the picture.
     pub rows: Vec<[f64; 2]>,
-    /// Similarity, row by row.
+    /// Similarity, row by row, if it is wanted.
     pub map: Vec<f32>,
 }
 
@@ -44,7 +44,7 @@ fn mirrored(i: isize, n: usize) -> usize {
 
 impl Tile<'_> {
     /// Works on rows from top to bottom; rows that were averaged along themselves are kept in a ring.
-    pub fn similarity(&self, radius: usize) -> Part {
+    pub fn similarity(&self, radius: usize, wants_map: bool) -> Part {
         let width = TILE[0].min(self.size[0] - self.at[0]);
         let height = TILE[1].min(self.size[1] - self.at[1]);
         let taps = 2 * radius + 1;
@@ -64,7 +64,9 @@ impl Tile<'_> {
             simd::dispatch(AlongColumn { rows, weights: self.weights, out: &mut means });
             let (norm, constants) = (self.norm, self.constants);
             simd::dispatch(Formula { means: &means, norm, constants, similarity, structure });
-            part.map.extend(similarity.iter().map(|v| *v as f32));
+            if wants_map {
+                part.map.extend(similarity.iter().map(|v| *v as f32));
+            }
             part.rows.push(self.inside(row, radius, [similarity, structure]));
         }
         part
