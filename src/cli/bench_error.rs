@@ -4,16 +4,18 @@ use super::bench::BenchBar;
 use super::scene_args::SceneArgs;
 use super::{Setting, interrupt, print};
 use crate::bench::error::measure::PixelSet;
-use crate::bench::error::present::{self, Shown, gather};
+use crate::bench::error::present::{self, gather};
 use crate::bench::error::record::{FORMAT, Record};
 use crate::bench::error::reference::Kept;
 use crate::bench::error::run::{Measured, Plan, TruthPlan, measure, program};
 use crate::bench::error::sweep::{Subject, Sweep, combinations, truth_settings};
 use crate::error::{Error, Result};
 use crate::image::write::{check_file, write_file};
+use crate::render::film::Film;
 use crate::render::settings::RenderSettings;
+use crate::report::Report;
 use crate::report::machine::Machine;
-use crate::report::{Picture, Report};
+use crate::report::viewer::{Viewed, Viewer};
 use crate::sampler::hash::mix64;
 use crate::scene::build::BuildOptions;
 use clap::{Args, ValueEnum};
@@ -211,32 +213,33 @@ impl ErrorArgs {
             if !measured.is_empty() {
                 report = report.machine(&Machine::here());
             }
-            let page = present::page(records, set, shown(measured)?, report);
+            let page = present::page(records, set, measured.iter().map(shown).collect(), report);
             write_file(path, page.to_html()?.as_bytes())?;
         }
         Ok(())
     }
 }
 
-/// Of each variant the first picture whose time comes nearest to that of the quickest variant's longest renders.
-fn shown(measured: &[Measured]) -> Result<Vec<Shown>> {
-    let mut out = Vec::new();
-    for (scene, m) in measured.iter().enumerate() {
-        let seconds = |series: usize, rung: usize| m.record.series[series].points[rung].runs[0].seconds;
-        let rungs = m.films.first().map_or(0, Vec::len);
-        let Some(last) = rungs.checked_sub(1) else { continue };
-        let time = (0..m.films.len()).map(|s| seconds(s, last)).fold(f64::INFINITY, f64::min);
-        for (s, films) in m.films.iter().enumerate() {
-            let far = |rung: usize| (seconds(s, rung) / time).ln().abs();
-            let Some(rung) = (0..rungs).min_by(|&a, &b| far(a).total_cmp(&far(b))) else { continue };
-            let series = &m.record.series[s];
-            out.push(Shown {
-                scene,
-                series: series.name.clone(),
-                spp: series.points[rung].spp,
-                picture: Picture::of_film(&films[rung], String::new())?,
-            });
-        }
-    }
-    Ok(out)
+/// Of each scene the reference, and of each variant the first picture whose time comes nearest to that of the quickest
+/// variant's longest renders.
+fn shown(measured: &Measured) -> Option<Viewer> {
+    let series = &measured.record.series;
+    let seconds = |series: usize, rung: usize| measured.record.series[series].points[rung].runs[0].seconds;
+    let last = measured.films.first()?.len().checked_sub(1)?;
+    let time = (0..series.len()).map(|s| seconds(s, last)).fold(f64::INFINITY, f64::min);
+    let picture = |(s, films): (usize, &Vec<Film>)| {
+        let far = |rung: usize| (seconds(s, rung) / time).ln().abs();
+        let rung = (0..=last).min_by(|&a, &b| far(a).total_cmp(&far(b)))?;
+        let name = format!("{}, {} spp", series[s].name, series[s].points[rung].spp);
+        let facts = vec![("seconds".to_owned(), format!("{:.3}", seconds(s, rung)))];
+        Some(Viewed { facts, ..Viewed::of_film(name, films.get(rung)?) })
+    };
+    let window = measured.films[0][0].window();
+    let rgb = measured.truth.rgb.clone();
+    let facts = vec![("samples a pixel".to_owned(), measured.record.reference.spp.to_string())];
+    let reference = Viewed { name: "reference".into(), rgb, facts };
+    let pictures: Vec<Viewed> =
+        std::iter::once(reference).chain(measured.films.iter().enumerate().filter_map(picture)).collect();
+    let alike = pictures.iter().all(|p| p.rgb.len() == window.area() as usize);
+    alike.then(|| Viewer::of_window(window, pictures))
 }

@@ -18,8 +18,9 @@ use std::path::{Path, PathBuf};
 #[derive(Args)]
 #[command(next_help_heading = "Output")]
 pub struct OutputArgs {
-    /// The picture to write; the extension says how. May be given several times
-    #[arg(short, long = "output", required_unless_present = "explain", value_name = "OUT.exr|png|jpg")]
+    /// The picture to write; the extension says how: exr, hdr, pfm and tiff hold radiance, png and jpg what a display shows. May
+    /// be given several times
+    #[arg(short, long = "output", required_unless_present = "explain", value_name = "OUT.exr|png|...")]
     outputs: Vec<PathBuf>,
     /// Further layers, for EXR (see `skylit list aov`)
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]

@@ -1,18 +1,24 @@
-//! A crosscheck as a page: the verdict, the counts, each kernel's picture, their difference, and the places.
+//! A crosscheck as a page: the verdict, the counts, each kernel's picture against the first, and the places.
 
+use super::Crosscheck;
 use super::compare::Style;
 use super::summary::{Line, Summary};
-use super::{Crosscheck, Difference};
-use crate::color::Rgb;
+use crate::base::pixel_rect::PixelRect;
 use crate::error::Result;
-use crate::image::tonemap::Look;
-use crate::render::film::Film;
 use crate::report::machine::Machine;
 use crate::report::table::{Cell, Column, Table, Tone};
+use crate::report::viewer::{ErrorMap, Region, Viewed, Viewer};
 use crate::report::{Block, Details, Picture, Report, Section, Verdict};
+use std::collections::HashSet;
 
 /// Differences in the page's table; the record has all that are kept.
 const LISTED: usize = 200;
+/// Places that the viewer flies to.
+const FLOWN_TO: usize = 24;
+/// Pixels of all pictures together up to which the page keeps them bit for bit: some 20 MB.
+const LOSSLESS: usize = 1_500_000;
+/// A mark where rounding explains a difference.
+const EXPLAINED: f32 = 0.5;
 
 /// The page.
 ///
@@ -96,66 +102,92 @@ fn scores(s: &Summary) -> Table {
 fn pictures(check: &Crosscheck) -> Result<Section> {
     let p = &check.pictures;
     let mut section = Section::new("Pictures");
+    if let [only] = p.films.as_slice() {
+        return Ok(section.with(Picture::of_film(only, check.names[0].clone())?));
+    }
+    for d in &p.against_first {
+        let names = format!("{} against {}", d.name, check.names[0]);
+        section = section.prose(match d.pixels.len() {
+            0 => format!("{names}: the same bits in every pixel."),
+            n => format!("{names}: {n} pixels differ, by {} at most.", d.largest),
+        });
+    }
     let Some(first) = p.films.first() else { return Ok(section) };
-    for (name, film) in check.names.iter().zip(&p.films) {
-        section = section.with(Picture::of_film(film, name.clone())?);
+    let window = first.window();
+    let shown = check.names.iter().zip(&p.films).zip(&check.kernels).map(|((name, film), kernel)| Viewed {
+        facts: vec![("kernel".to_owned(), kernel.clone())],
+        ..Viewed::of_film(name.clone(), film)
+    });
+    let places = Places::new(check, window);
+    let pixels = window.area() as usize * p.films.len();
+    Ok(section.with(Viewer {
+        maps: (1..p.films.len()).flat_map(|test| places.map(test)).collect(),
+        regions: places.regions(),
+        lossless: pixels <= LOSSLESS,
+        ..Viewer::of_window(window, shown.collect())
+    }))
+}
+
+/// Pixels in which kernels differ, the worst first, each once.
+struct Places<'a> {
+    window: PixelRect,
+    /// Pixel, picture (from 1), whether rounding explains it, and what differs.
+    all: Vec<([u32; 2], usize, bool, &'a str)>,
+}
+
+impl<'a> Places<'a> {
+    fn new(check: &'a Crosscheck, window: PixelRect) -> Self {
+        // Of every difference the first picture that is held against the reference will do.
+        let on_rays = check.differences.iter().filter_map(|d| {
+            let explained = d.judgement.is_explained();
+            Some((d.source?.pixel, 1, explained, d.judgement.class.text()))
+        });
+        let against = check.pictures.against_first.iter().enumerate();
+        let orphans = against
+            .flat_map(|(i, d)| d.unexplained.iter().map(move |p| (*p, i + 1, false, "no ray differs there")));
+        let mut all: Vec<_> = on_rays.chain(orphans).collect();
+        // What nothing explains has the first word of a pixel.
+        all.sort_by_key(|place| place.2);
+        let mut seen = HashSet::new();
+        all.retain(|([x, y], ..)| window.contains(*x, *y) && seen.insert([*x, *y]));
+        Places { window, all }
     }
-    for (d, film) in p.against_first.iter().zip(p.films.iter().skip(1)) {
-        let names = format!("{} - {}", d.name, check.names[0]);
-        if d.pixels.is_empty() {
-            section = section.prose(format!("{names}: the same bits in every pixel."));
-            continue;
+
+    /// A mark on each pixel; none where there is none.
+    fn map(&self, test: usize) -> Option<ErrorMap> {
+        if self.all.is_empty() {
+            return None;
         }
-        let scale = if d.largest > 0.0 { 1.0 / d.largest } else { 0.0 };
-        let apart =
-            |(a, b): (Rgb, Rgb)| Rgb::new((a.r - b.r).abs(), (a.g - b.g).abs(), (a.b - b.b).abs()) * scale;
-        let text = format!(
-            "{names}: {} pixels differ. Sizes of the differences, black is none and white is {}",
-            d.pixels.len(),
-            d.largest
-        );
-        section = section.with(picture(first, colors(first).zip(colors(film)).map(apart), text)?);
-    }
-    if !p.marked.is_empty() {
-        section = section.with(places(check, first)?);
-    }
-    Ok(section)
-}
-
-fn colors(film: &Film) -> impl Iterator<Item = Rgb> + '_ {
-    film.window().pixels().map(|(x, y)| film.mean(x, y))
-}
-
-/// Grey, with a mark on each pixel that holds a difference.
-fn places(check: &Crosscheck, film: &Film) -> Result<Picture> {
-    let grey = |c: Rgb| {
-        let l = Look::default().apply(c).luminance() * 0.4;
-        Rgb::new(l, l, l)
-    };
-    let mut colors: Vec<Rgb> = colors(film).map(grey).collect();
-    let window = film.window();
-    let mut mark = |[x, y]: [u32; 2], color: Rgb| {
-        // Three pixels wide, so that one is seen.
-        for (dx, dy) in (0..9).map(|i| (i % 3, i / 3)) {
-            let (x, y) = ((x + dx).wrapping_sub(1), (y + dy).wrapping_sub(1));
-            if window.contains(x, y) {
-                colors[window.index(x, y)] = color;
+        let mut values = vec![0.0f32; self.window.area() as usize];
+        for ([x, y], _, explained, _) in &self.all {
+            // Three pixels wide, so that one is seen.
+            for (dx, dy) in (0..9).map(|i| (i % 3, i / 3)) {
+                let (x, y) = ((x + dx).wrapping_sub(1), (y + dy).wrapping_sub(1));
+                if self.window.contains(x, y) {
+                    let value = &mut values[self.window.index(x, y)];
+                    *value = value.max(if *explained { EXPLAINED } else { 1.0 });
+                }
             }
         }
-    };
-    let amber = Rgb::new(1.0, 0.5, 0.0);
-    check.pictures.marked.iter().for_each(|p| mark(*p, amber));
-    let bad = |d: &&Difference| !d.judgement.is_explained();
-    let sources = check.differences.iter().filter(bad).filter_map(|d| d.source);
-    let orphans = check.pictures.against_first.iter().flat_map(|d| d.unexplained.iter().copied());
-    sources.map(|s| s.pixel).chain(orphans).for_each(|p| mark(p, Rgb::new(1.0, 0.0, 0.0)));
-    let text = "Where kernels differ on a ray: orange where rounding explains it, red where nothing does";
-    picture(film, colors.into_iter(), text.into())
-}
+        let metric = "kernels differ".to_owned();
+        let help = format!(
+            "pixels with a ray on which kernels differ, and those beside them: {EXPLAINED} where rounding explains it, 1 where \
+             nothing does"
+        );
+        Some(ErrorMap { metric, help, test, values, high: Some(1.0) })
+    }
 
-/// Display-linear colours of a film's pixels.
-fn picture(film: &Film, colors: impl Iterator<Item = Rgb>, caption: String) -> Result<Picture> {
-    Picture::of_colors([film.window().width(), film.window().height()], colors, caption)
+    fn regions(&self) -> Vec<Region> {
+        let region = |([x, y], test, explained, what): &([u32; 2], usize, bool, &str)| Region {
+            label: format!(
+                "({x}, {y}): {what}{}",
+                if *explained { ", by rounding" } else { ", NOT EXPLAINED" }
+            ),
+            test: *test,
+            rect: [(x - self.window.x0) as usize, (y - self.window.y0) as usize, 1, 1],
+        };
+        self.all.iter().take(FLOWN_TO).map(region).collect()
+    }
 }
 
 fn differences(s: &Summary) -> Section {

@@ -195,7 +195,7 @@ fn results_are_the_same_from_any_number_of_threads_and_can_be_told() {
         let c = run(&mut scene, &plan, &Silent).unwrap();
         let summary = Summary::new(&c, &scene, "skylit crosscheck scene.toml");
         let page = html::page(&c, &summary, &crate::report::machine::Machine::here(), "scene.toml").unwrap();
-        assert!(page.contains("data:image/png") && page.contains("misses what must be met"));
+        assert!(page.contains("data-viewer") && page.contains("misses what must be met"));
         (summary.to_string(), serde_json::to_string(&summary).unwrap())
     });
     assert_eq!(text[0], text[1]);

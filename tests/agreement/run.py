@@ -1,14 +1,15 @@
 #!/usr/bin/env python3
-"""How far our FLIP, SSIM and PSNR are from the reference implementations: a table over pairs of pictures.
+"""How far our FLIP, SSIM and PSNR are from the reference implementations, and how well the test for bias keeps its word: tables.
 
     python3 -m venv venv && venv/bin/pip install flip-evaluator==1.7 scikit-image==0.26.0 numpy imageio OpenEXR
-    venv/bin/python tests/agreement/run.py [--write] [--only WORD] [--keep DIR]
+    venv/bin/python tests/agreement/run.py [--write] [--only WORD] [--keep DIR] [--statistics]
 
 Pairs are made here by formulas (fixed seeds), and, where SKYLIT_DATA (or ../shared/data) is there, taken from
 it: other people's renders of the same scenes, references with noise put in, the pair of the FLIP authors. All are handed on as
 8-bit PNG or as PFM, so that both sides see the same numbers. --write puts the tables into tests/README.md, between their
 markers; --keep leaves the pictures in a folder. Exit code 1 if a pair is beyond the limits: 1e-4 for the mean of FLIP, 1e-6
-for SSIM, and PSNR in decibels.
+for SSIM, and PSNR in decibels. What is told of the test for bias is the record of `cargo bench --bench statistics`, taken anew by
+--statistics, which takes some two hours of two processors.
 
 FLIP there is the mean in f64 of flip-evaluator's own map: it sums in f32 itself, which loses digits in large pictures. SSIM
 is with Gaussian weights of 1.5 pixels and covariances of the population, range 1, channels apart: Wang's settings.
@@ -29,7 +30,7 @@ from skimage.metrics import peak_signal_noise_ratio, structural_similarity
 
 HOME = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 DATA = os.environ.get("SKYLIT_DATA", os.path.join(HOME, "..", "shared", "data"))
-BEGIN, END = "<!-- agreement: begin -->", "<!-- agreement: end -->"
+RECORD = os.path.join(HOME, "benches", "records", "statistics.json")
 LDR_HEADER = (
     "pair | size | FLIP | less flip-evaluator's | SSIM | less scikit-image's | PSNR, dB | less scikit-image's"
 )
@@ -242,6 +243,7 @@ def main():
     parser.add_argument("--write", action="store_true")
     parser.add_argument("--only", default="")
     parser.add_argument("--keep")
+    parser.add_argument("--statistics", action="store_true")
     options = parser.parse_args()
     subprocess.run(["cargo", "build", "--quiet", "--release"], cwd=HOME, check=True)
     lines, misses, counts = [], [], []
@@ -268,13 +270,82 @@ def main():
     )
     print(summary)
     if options.write:
-        path = os.path.join(HOME, "tests", "README.md")
-        text = open(path).read()
-        before, rest = text.split(BEGIN, 1)
-        after = rest.split(END, 1)[1]
-        with open(path, "w") as f:
-            f.write(f"{before}{BEGIN}\n{summary}\n\n" + "\n".join(lines).rstrip() + f"\n{END}{after}")
-    return 1 if misses else 0
+        write("agreement", summary + "\n\n" + "\n".join(lines).rstrip())
+    if options.statistics:
+        # It writes its record whatever comes out, and that is told below.
+        subprocess.run(["cargo", "bench", "--quiet", "--bench", "statistics", "--", "--json", RECORD], cwd=HOME)
+    with open(RECORD) as f:
+        told, kept = statistics(json.load(f))
+    print("\n" + told)
+    if options.write:
+        write("statistics", told)
+    return 1 if misses or not kept else 0
+
+
+def write(part, text):
+    """Puts a text between its markers."""
+    path = os.path.join(HOME, "tests", "README.md")
+    begin, end = f"<!-- {part}: begin -->", f"<!-- {part}: end -->"
+    before, rest = open(path).read().split(begin, 1)
+    after = rest.split(end, 1)[1]
+    with open(path, "w") as f:
+        f.write(f"{before}{begin}\n{text}\n{end}{after}")
+
+
+def table(header, rows):
+    names = header.split(" | ")
+    lines = ["| " + header + " |", "|---|" + "---:|" * (len(names) - 1)]
+    return "\n".join(lines + ["| " + " | ".join(row) + " |" for row in rows])
+
+
+def statistics(record):
+    """The record of the test for bias as tables, and whether every promise was kept."""
+    percent = lambda part, whole, digits=2: f"{100 * part / whole:.{digits}f} %"
+    named = lambda case, passes: case.split(" ", 1)[1] + ("" if passes else " **miss**")
+    rates = [
+        [
+            named(r["case"], r["passes"]),
+            "{}, {}".format(*r["spp"]),
+            str(r["pairs"]),
+            percent(r["different"], r["pairs"]),
+            f"{r['binomial_p']:.2f}",
+            "1 %" if r["exact"] else "at most 1 %",
+            percent(r["tiles_below"][1], 1),
+        ]
+        for r in record["rates"]
+    ]
+    powers = [
+        [
+            named(p["case"], p["passes"]),
+            "{}x{}".format(*p["size"]),
+            str(p["pixels"]),
+            str(p["pairs"]),
+            percent(p["found"], p["pairs"], 0),
+            percent(p["different"], p["pairs"], 0),
+            percent(p["promised"], 1),
+        ]
+        for p in record["powers"]
+    ]
+    margins = [
+        [
+            named(m["case"], m["passes"]),
+            f"{m['apart']:g}",
+            str(m["pairs"]),
+            percent(m["equivalent"], m["pairs"], 1),
+            percent(m["different"], m["pairs"], 1),
+        ]
+        for m in record["margins"]
+    ]
+    parts = [
+        "Pairs that differ in their noise alone, called different at 1 %:",
+        table("pairs | samples | number | different | binomial p | should be | tiles at 1 %", rates),
+        "One material 0.5 % brighter, or of a hue that leaves luminance as it is, at 64 samples a pixel:",
+        table("pairs | size | its pixels | number | object found | different | promised to find", powers),
+        "Asked for equivalence, pairs that are so many margins apart, 32 samples a pixel:",
+        table("pairs, margin | apart | number | equivalent | different", margins),
+    ]
+    everything = record["rates"] + record["powers"] + record["margins"]
+    return "\n\n".join(parts), all(row["passes"] for row in everything)
 
 
 if __name__ == "__main__":

@@ -194,9 +194,11 @@ pub fn speed_up(slow: &Curve, fast: &Curve) -> Option<SpeedUp> {
     let level = 0.5 * (a_low.max(b_low) + a_high.min(b_high));
     let ratio = |a: &[[f64; 2]], b: &[[f64; 2]]| {
         let (slow, fast) = (time_at(a, level)?, time_at(b, level)?);
-        Some((slow.seconds / fast.seconds, slow.beyond || fast.beyond))
+        let ratio = slow.seconds / fast.seconds;
+        (!ratio.is_nan()).then_some((ratio, slow.beyond || fast.beyond))
     };
-    let (value, beyond) = ratio(&a, &b)?;
+    // Where errors grow with time, as a few bright pixels may make it look, a curve meets a level never or everywhere.
+    let (value, beyond) = ratio(&a, &b).filter(|(ratio, _)| ratio.is_normal())?;
     let mut drawn: Vec<f64> = (0..RESAMPLES)
         .filter_map(|k| {
             let pick = |side: u64| {

@@ -6,22 +6,11 @@ use super::peers;
 use super::record::{Record, ReferenceRecord, SceneRecord, Series};
 use crate::report::lines::{Axis, Line, Lines};
 use crate::report::table::{Cell, Column, Table, Tone};
-use crate::report::{Details, Picture, Report, Section, Verdict};
+use crate::report::viewer::Viewer;
+use crate::report::{Details, Report, Section, Verdict};
 
 /// Relative root mean square errors whose times are told.
 const LEVELS: [f64; 3] = [0.05, 0.02, 0.01];
-
-/// A picture of the page: of which scene and series, and from how long a render.
-pub struct Shown {
-    /// Index into the scenes.
-    pub scene: usize,
-    /// The series' name.
-    pub series: String,
-    /// Samples a pixel.
-    pub spp: u64,
-    /// The picture, its caption still open.
-    pub picture: Picture,
-}
 
 /// A series with the reference that it was measured against: its own.
 struct Row<'a> {
@@ -204,34 +193,27 @@ pub fn text(records: &[&Record], set: PixelSet) -> String {
     out
 }
 
-/// The page. `shown` are pictures at about equal time.
-pub fn page(records: &[&Record], set: PixelSet, shown: Vec<Shown>, report: Report) -> Report {
+/// The page. `shown` are pictures of each scene at about equal time, as far as there are any.
+pub fn page(records: &[&Record], set: PixelSet, shown: Vec<Option<Viewer>>, report: Report) -> Report {
     let scenes = gather(records);
     let other = match set {
         PixelSet::All => PixelSet::Surfaces,
         PixelSet::Surfaces => PixelSet::All,
     };
-    let mut pictures: Vec<Vec<Picture>> = scenes.iter().map(|_| Vec::new()).collect();
-    for mut s in shown {
-        s.picture.caption = format!("{}: {} samples a pixel", s.series, s.spp);
-        pictures[s.scene].push(s.picture);
-    }
     let names: Vec<&str> = scenes.iter().map(|s| s.name).collect();
     let mut report = report.subtitle(names.join(", ")).verdict(Verdict::neutral(verdict(&scenes, set)));
     if let Some(table) = peers::table(records, set) {
         report = report.section(Section::new("Times as long to the same error").with(table));
     }
-    for (scene, pictures) in scenes.iter().zip(pictures) {
+    let shown = shown.into_iter().chain(std::iter::repeat(None));
+    for (scene, viewer) in scenes.iter().zip(shown) {
         let mut section = Section::new(scene.name)
             .with(scene.plot(set))
             .with(scene.summary_table(set))
             .with(scene.points_table(set))
             .prose(scene.reference_line());
-        if !pictures.is_empty() {
-            section = section.prose("At about equal time:");
-        }
-        for picture in pictures {
-            section = section.with(picture);
+        if let Some(viewer) = viewer {
+            section = section.prose("At about equal time:").with(viewer);
         }
         let summary = match other {
             PixelSet::All => "Over all pixels",

@@ -50,6 +50,8 @@ pub struct Measured {
     pub record: SceneRecord,
     /// By variant, then by sample count.
     pub films: Vec<Vec<Film>>,
+    /// What they are held against.
+    pub truth: Truth,
 }
 
 struct Variant {
@@ -129,7 +131,7 @@ pub fn measure(plan: &Plan, progress: &dyn Progress) -> Result<Measured> {
         reference: reference.record.clone(),
         series: series.collect(),
     };
-    Ok(Measured { record, films })
+    Ok(Measured { record, films, truth: reference.truth })
 }
 
 /// Name and version of this program.

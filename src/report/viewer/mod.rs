@@ -6,8 +6,10 @@ pub(super) mod pack;
 #[cfg(test)]
 mod tests;
 
+use crate::base::pixel_rect::PixelRect;
 use crate::error::{Error, Result};
 use crate::image::false_color::FalseColour;
+use crate::render::film::Film;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use pack::{Packed, pack, pack_map};
@@ -121,7 +123,21 @@ struct PictureFacts {
     facts: Vec<(String, String)>,
 }
 
+impl Viewed {
+    /// A film, in radiance.
+    pub fn of_film(name: String, film: &Film) -> Self {
+        let rgb = film.window().pixels().map(|(x, y)| film.mean(x, y)).map(|c| [c.r, c.g, c.b]);
+        Viewed { name, rgb: rgb.collect(), facts: Vec::new() }
+    }
+}
+
 impl Viewer {
+    /// Pictures of a part of a film, the reference first.
+    pub fn of_window(window: PixelRect, pictures: Vec<Viewed>) -> Self {
+        let size = [window.width(), window.height()].map(|v| v as usize);
+        Viewer { size, origin: [window.x0, window.y0].map(|v| v as usize), pictures, ..Viewer::default() }
+    }
+
     /// What the page holds of it.
     ///
     /// # Errors

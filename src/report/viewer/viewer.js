@@ -69,12 +69,19 @@ class Viewer {
     select.title = this.maps[this.state.map].help;
   }
 
-  // Values of the chosen map, its range and canvas; kept until another is chosen.
-  map() {
-    const { test, map } = this.state, key = `map ${test} ${map}`;
+  // A second map for a place that would be empty: FLIP, or another that the page holds, or the first; none that is chosen already.
+  companion() {
+    const other = (test) => this.maps.findIndex((m, i) => i !== this.state.map && test(m));
+    return [(m) => /FLIP/.test(m.metric), (m) => m.bytes, () => true].map(other).find((i) => i >= 0);
+  }
+
+  // Values of a map, the chosen one if none is said, its range and canvas; kept while it is seen.
+  map(index = this.state.map) {
+    const of = (i) => `map ${this.state.test} ${i}`, key = of(index);
     if (!this.shown.has(key)) {
-      for (const k of this.shown.keys()) if (typeof k === "string") this.shown.delete(k);
-      const m = this.maps[map];
+      const seen = [this.state.map, this.companion()].map(of);
+      for (const k of this.shown.keys()) if (typeof k === "string" && !seen.includes(k)) this.shown.delete(k);
+      const { test } = this.state, m = this.maps[index];
       const values = m.bytes ? Float32Array.from(m.bytes, (b) => (b / 255) * m.high) : errorValues(m, this.pictures[0], this.pictures[test], this.epsilon);
       const high = m.bytes ? m.high : mostly(values);
       const scale = this.scale ??= Uint8Array.from(atob(this.config.scale), (c) => c.charCodeAt(0));
@@ -127,6 +134,7 @@ class Viewer {
       return { columns, pw, ph, scale: Math.min(pw / this.width, ph / this.height) };
     });
     const { columns, pw, ph } = sized.reduce((a, b) => (b.scale > a.scale * 1.001 ? b : a));
+    if (columns === 2) list.push(["map", this.companion()]);
     return list.map((shows, i) => ({ x: (i % columns) * (pw + gap), y: Math.floor(i / columns) * (ph + gap), w: pw, h: ph, shows }));
   }
 
@@ -161,14 +169,15 @@ class Viewer {
       this.drawLabels(panel);
     }
     this.readout();
-    this.find("legend").hidden = !this.panels().some((p) => p.shows[0] === "map");
-    if (!this.find("legend").hidden) this.legend();
+    const map = this.panels().find((p) => p.shows[0] === "map");
+    this.find("legend").hidden = !map;
+    if (map) this.legend(map);
   }
 
   // The part of a panel between two columns of the stage.
   drawPart(panel, [kind, index], [from, to]) {
     const c = this.context, { scale, cx, cy } = this.state;
-    const { canvas, stride } = kind === "map" ? this.map() : this.picture(index);
+    const { canvas, stride } = kind === "map" ? this.map(index) : this.picture(index);
     c.save();
     c.beginPath();
     c.rect(from, panel.y, to - from, panel.h);
@@ -183,7 +192,7 @@ class Viewer {
     const step = scale * stride;
     if (x1 > x0 && y1 > y0) {
       c.drawImage(canvas, x0, y0, x1 - x0, y1 - y0, left + x0 * step, top + y0 * step, (x1 - x0) * step, (y1 - y0) * step);
-      if (scale >= 12 && stride === 1) this.drawGrid([left, top], [x0, y0, x1, y1], scale, kind === "map" ? null : this.pictures[index]);
+      if (scale >= 12 && stride === 1) this.drawGrid([left, top], [x0, y0, x1, y1], scale, kind === "map" ? this.map(index).values : this.pictures[index]);
     }
     c.restore();
   }
@@ -198,6 +207,7 @@ class Viewer {
     for (let y = y0; y <= y1; y++) { c.moveTo(left + x0 * scale, top + y * scale); c.lineTo(left + x1 * scale, top + y * scale); }
     c.stroke();
     if (scale < 56) return;
+    const colors = values.length > this.width * this.height;
     c.font = "11px ui-monospace, monospace";
     c.textAlign = "center";
     c.lineWidth = 3;
@@ -205,19 +215,21 @@ class Viewer {
     for (let y = y0; y < y1; y++) {
       for (let x = x0; x < x1; x++) {
         const at = y * this.width + x, mx = left + (x + 0.5) * scale, my = top + (y + 0.5) * scale;
-        const texts = values ? [0, 1, 2].map((k) => short(values[3 * at + k])) : [short(this.map().values[at])];
+        const texts = colors ? [0, 1, 2].map((k) => short(values[3 * at + k])) : [short(values[at])];
         texts.forEach((text, k) => {
           const ty = my + 4 + (k - (texts.length - 1) / 2) * 14;
           c.strokeText(text, mx, ty);
-          c.fillStyle = values ? ["#ff9c92", "#9df09d", "#9cc4ff"][k] : "#fff";
+          c.fillStyle = colors ? ["#ff9c92", "#9df09d", "#9cc4ff"][k] : "#fff";
           c.fillText(text, mx, ty);
         });
       }
     }
   }
 
-  name(shows) {
-    return shows[0] === "map" ? this.maps[this.state.map].metric : this.config.pictures[shows[1]].name;
+  name([kind, index]) {
+    if (kind !== "map") return this.config.pictures[index].name;
+    // The legend is of the chosen one alone.
+    return index === undefined ? this.maps[this.state.map].metric : `${this.maps[index].metric}, to ${short(this.map(index).high)}`;
   }
 
   drawLabels(panel) {
@@ -257,16 +269,22 @@ class Viewer {
          line("difference", rgb(test).map((v, c) => short(v - rgb(0)[c], true)))]
       : [line(this.config.pictures[0].name, ["", "", ""]), line(this.config.pictures[test].name, ["", "", ""]), line("difference", ["", "", ""])];
     const place = shows ? `${Math.floor(here.px) + this.config.origin[0]}, ${Math.floor(here.py) + this.config.origin[1]}` : "–";
-    const value = shows && this.panels().some((p) => p.shows[0] === "map") ? short(this.map().values[at]) : "";
+    const map = this.panels().some((p) => p.shows[0] === "map");
+    const index = (here && here.panel.shows[0] === "map" && here.panel.shows[1]) || this.state.map;
+    const value = shows && map ? short(this.map(index).values[at]) : "";
     const text = (tag, content, cls = "") => Object.assign(document.createElement(tag), { textContent: content, className: cls });
     cells.replaceChildren(
       ...rows.flatMap((row) => [text("span", row[0], "name"), text("span", row[1], "r"), text("span", row[2], "g"), text("span", row[3], "b")]),
-      text("span", `pixel ${place}`, "name"), text("span", value && `${this.maps[this.state.map].metric} ${value}`, "map"),
+      text("span", `pixel ${place}`, "name"), text("span", value && `${this.maps[index].metric} ${value}`, "map"),
       text("span", `${Math.round(100 * this.state.scale)} %`, "zoom"));
   }
 
-  legend() {
-    const { m, high } = this.map(), bar = this.find("legend").querySelector("canvas"), c = bar.getContext("2d");
+  // In the corner of the chosen map.
+  legend(panel) {
+    const { m, high } = this.map(), legend = this.find("legend"), bar = legend.querySelector("canvas"), c = bar.getContext("2d");
+    legend.style.right = `${this.box[0] - panel.x - panel.w + 8}px`;
+    legend.style.maxWidth = `${panel.w - 16}px`;
+    legend.style.bottom = `${this.box[1] - panel.y - panel.h + 8}px`;
     const image = c.createImageData(256, 1);
     for (let i = 0; i < 256; i++) {
       if (m.signed) diverging(i / 127.5 - 1, image.data, 4 * i);
@@ -274,10 +292,10 @@ class Viewer {
       image.data[4 * i + 3] = 255;
     }
     c.putImageData(image, 0, 0);
-    const [low, top] = this.find("legend").querySelectorAll("span");
+    const [low, top] = legend.querySelectorAll("span");
     low.textContent = m.signed ? short(-high) : "0";
     top.textContent = short(high);
-    this.find("legend").title = m.help;
+    legend.title = m.help;
   }
 
   zoom(factor, x, y) {

@@ -34,7 +34,7 @@ fn error_is_measured_against_time_and_kept() {
     let files = std::fs::read_dir(f.path().join("r.references")).unwrap().count();
     assert_eq!(files, 1);
     let read = |name: &str| std::fs::read_to_string(f.path().join(name)).unwrap();
-    assert!(read("r.svg").starts_with("<svg") && read("r.html").contains("data:image/png"));
+    assert!(read("r.svg").starts_with("<svg") && read("r.html").contains("data-viewer"));
     assert_eq!(read("r.csv").lines().count(), 1 + 2 * 2 * 2);
 }
 

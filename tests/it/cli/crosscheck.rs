@@ -15,7 +15,7 @@ fn it_tells_writes_and_asks_one_ray_again() {
     assert_eq!(record["crosscheck"]["camera_rays"], 8 * 6 * 2);
     assert!(record["machine"]["command"].as_str().is_some_and(|c| c.contains("crosscheck scene.toml")));
     let page = std::fs::read_to_string(f.path().join("c.html")).unwrap();
-    assert!(page.contains("Crosscheck") && page.contains("data:image/png"));
+    assert!(page.contains("Crosscheck") && page.contains("data-viewer"));
     // Into the middle of the mesh, from where the camera is.
     let run = f.run("crosscheck scene.toml --ray -0.01,-0.01,1,0,0,-1,0,inf --backend brute").succeeds();
     for word in ["closest hit", "any hit", "brute", "oracle, of all primitives", "verdict"] {

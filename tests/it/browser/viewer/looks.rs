@@ -2,7 +2,7 @@
 
 use super::{Page, SIZE, WINDOW, assert_colours, exact, ramp};
 use serde_json::json;
-use skylit::report::viewer::{Region, Viewed, Viewer};
+use skylit::report::viewer::{ErrorMap, Region, Viewed, Viewer};
 
 #[test]
 fn three_pictures_stand_side_by_side_at_first() {
@@ -20,6 +20,41 @@ fn three_pictures_stand_side_by_side_at_first() {
     assert!(test.iter().zip(reference).all(|(t, r)| *t > r), "{reference:?}, {test:?}");
     // Everywhere brighter by as much: all of the end of the scale, which is red.
     assert!(error[0] > 150 && error[2] < 80, "{error:?}");
+    page.tab.assert_clean();
+}
+
+#[test]
+fn a_place_that_would_be_empty_shows_another_map() {
+    // Twice as wide as high, which is largest in two rows of two.
+    let size = [64, 32];
+    let flat =
+        |name: &str, v: f32| Viewed { name: name.into(), rgb: vec![[v; 3]; 64 * 32], facts: Vec::new() };
+    let values = (0..64 * 32).map(|i| (i % 64) as f32 / 64.0).collect();
+    let map = ErrorMap { metric: "HDR-FLIP".into(), help: String::new(), test: 1, values, high: Some(1.0) };
+    let pictures = vec![flat("a", 0.25), flat("b", 0.5)];
+    let Some(mut page) = Page::of(Viewer { size, pictures, maps: vec![map], ..Viewer::default() }) else {
+        return;
+    };
+    let [x, y, w, h] = page.tab.place("canvas[data-stage]");
+    for (at, wanted) in [([0.25, 0.75], "signed 0.25"), ([0.75, 0.75], "HDR-FLIP 0.50")] {
+        page.tab.move_to([x + at[0] * w + 1.0, y + at[1] * h]);
+        let told = page.readout();
+        assert!(told[told.len() - 2].starts_with(wanted), "{wanted}: {told:?}");
+    }
+    // The legend is that of the chosen map, in its corner.
+    let legend = page.told(
+        "(() => { const l = document.querySelector('[data-legend]').getBoundingClientRect(), c = document.querySelector('canvas[data-stage]').getBoundingClientRect();
+        return l.right < c.left + c.width / 2 && l.top > c.top + c.height / 2; })()",
+    );
+    assert_eq!(legend, json!(true));
+    page.mode("map");
+    page.tab.choose("[data-map]", "HDR-FLIP");
+    page.mode("side");
+    // Chosen, it stands in its own place, and the first of the others beside it.
+    let names = page.told(
+        "(() => { const v = document.querySelector('[data-viewer]').viewer; return v.panels().map((p) => v.name(p.shows).split(',')[0]); })()",
+    );
+    assert_eq!(names, json!(["a", "b", "HDR-FLIP", "signed"]));
     page.tab.assert_clean();
 }
 
