@@ -240,6 +240,6 @@ fn shown(measured: &Measured) -> Option<Viewer> {
     let reference = Viewed { name: "reference".into(), rgb, facts };
     let pictures: Vec<Viewed> =
         std::iter::once(reference).chain(measured.films.iter().enumerate().filter_map(picture)).collect();
-    let alike = pictures.iter().all(|p| p.rgb.len() == window.area() as usize);
+    let alike = pictures.iter().all(|p| p.rgb.len() == window.area());
     alike.then(|| Viewer::of_window(window, pictures))
 }

@@ -119,7 +119,7 @@ fn pictures(check: &Crosscheck) -> Result<Section> {
         ..Viewed::of_film(name.clone(), film)
     });
     let places = Places::new(check, window);
-    let pixels = window.area() as usize * p.films.len();
+    let pixels = window.area() * p.films.len();
     Ok(section.with(Viewer {
         maps: (1..p.films.len()).flat_map(|test| places.map(test)).collect(),
         regions: places.regions(),
@@ -158,7 +158,7 @@ impl<'a> Places<'a> {
         if self.all.is_empty() {
             return None;
         }
-        let mut values = vec![0.0f32; self.window.area() as usize];
+        let mut values = vec![0.0f32; self.window.area()];
         for ([x, y], _, explained, _) in &self.all {
             // Three pixels wide, so that one is seen.
             for (dx, dy) in (0..9).map(|i| (i % 3, i / 3)) {

@@ -322,7 +322,7 @@ def statistics(record):
             str(p["pairs"]),
             percent(p["found"], p["pairs"], 0),
             percent(p["different"], p["pairs"], 0),
-            percent(p["promised"], 1),
+            "-" if p["promised"] is None else percent(p["promised"], 1),
         ]
         for p in record["powers"]
     ]
