@@ -9,7 +9,7 @@ it: other people's renders of the same scenes, references with noise put in, the
 8-bit PNG or as PFM, so that both sides see the same numbers. --write puts the tables into tests/README.md, between their
 markers; --keep leaves the pictures in a folder. Exit code 1 if a pair is beyond the limits: 1e-4 for the mean of FLIP, 1e-6
 for SSIM, and PSNR in decibels. What is told of the test for bias is the record of `cargo bench --bench statistics`, taken anew by
---statistics, which takes some two hours of two processors.
+--statistics, which takes more than an hour of two processors.
 
 FLIP there is the mean in f64 of flip-evaluator's own map: it sums in f32 itself, which loses digits in large pictures. SSIM
 is with Gaussian weights of 1.5 pixels and covariances of the population, range 1, channels apart: Wang's settings.

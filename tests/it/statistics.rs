@@ -1,11 +1,8 @@
 //! The test for bias: how often it errs, on noise whose truth is known and on renders, and what it says. The long form is
 //! `cargo bench --bench statistics`.
 
-// The long form uses more of them.
-#[allow(dead_code)]
 #[path = "../../benches/statistics/noise.rs"]
 mod noise;
-#[allow(dead_code)]
 #[path = "../../benches/statistics/scenes.rs"]
 mod scenes;
 

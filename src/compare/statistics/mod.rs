@@ -10,7 +10,7 @@
 //! Three families are asked: the whole picture, its tiles, its objects (or other regions that are given), each for one
 //! probability (Simes' for many), and these are combined by weights ([`families::combined`]): a third each, or a half each
 //! where there are no objects. *Different* means that the combination is at most `alpha`, 1 % by default: where the pictures
-//! are of the same, that is said of 1 % of pairs, no more and hardly fewer. Beside it, tiles and objects are marked by
+//! are of the same, that is said of 1 % of pairs, but where fireflies rule (below). Beside it, tiles and objects are marked by
 //! Benjamini and Hochberg, which says where.
 //!
 //! # What has no noise
