@@ -4,7 +4,7 @@
 //!
 //! *False alarms*: N (10,000) pairs of 48 x 48 pixels that differ in their seeds alone, of synthetic noise and of renders;
 //! counted are verdicts "different" at 1 %, which must be consistent with 1 % (two-sided binomial test at 1 %), and held
-//! against a uniform distribution are the p-values of tiles. *Finds*: pairs in which one material's reflectance is 0.5 %
+//! against a uniform distribution are the places of tiles among deals. *Finds*: pairs in which one material's reflectance is 0.5 %
 //! higher, or of another hue, at 64 samples a pixel; its object is to be found in 95 %, where the picture itself
 //! says that so little would be. *Margins*: pairs that are apart by
 //! exactly the margin, of which at most 5 % may be called equivalent, and pairs of the same, of which most should be. Prints a
@@ -56,9 +56,8 @@ fn rates(pairs: usize, wanted: &dyn Fn(&str) -> bool, book: &mut Book) {
                 let name = format!("rate {noise:?} {colour:?}").to_lowercase();
                 if wanted(&format!("{name} {} {}", spp[0], spp[1])) {
                     let make = |k: usize, seed: u64| noise::picture(SIDE, seed, spp[k], noise, colour);
-                    // Tiles with few fireflies are judged with care, and so is noise that is borrowed.
-                    let exact = noise != Noise::Firefly && spp[0] == spp[1];
-                    book.rate(rate(name, spp, pairs, exact, &make));
+                    // Noise that is borrowed is judged with care.
+                    book.rate(rate(name, spp, pairs, spp[0] == spp[1], &make));
                 }
             }
         }
@@ -85,16 +84,19 @@ fn rate(
 ) -> Rate {
     let start = Instant::now();
     // What is wanted of a pair: the verdict, families by name, tiles.
-    let all: Vec<(bool, [f64; 3], Vec<f64>)> = each(pairs as u64, |i| {
+    let all: Vec<(bool, [f64; 3], Vec<[f64; 2]>)> = each(pairs as u64, |i| {
         let r = compare(&make(0, 2 * i), &make(1, 2 * i + 1), &Question::default()).expect("a pair");
         let family = |name: &str| r.families.iter().find(|f| f.name == name).map_or(1.0, |f| f.p);
-        let tiles = r.tiles.iter().filter_map(|t| t.p).collect();
+        // And where they stand among deals, which has no steps.
+        let tiles =
+            r.tiles.iter().filter_map(|t| t.p.map(|p| [p, t.place_among_deals.unwrap_or(p)])).collect();
         (r.outcome == Outcome::Different, ["whole", "tiles", "objects"].map(family), tiles)
     });
     let different = all.iter().filter(|a| a.0).count();
     let [whole, tiles, objects] = [0, 1, 2].map(|k| all.iter().filter(|a| a.1[k] <= ALPHA).count());
-    let values: Vec<f64> = all.iter().flat_map(|a| &a.2).copied().collect();
-    let uniform = uniformity(&values).unwrap_or_default();
+    let values = |k: usize| all.iter().flat_map(|a| &a.2).map(|v| v[k]).collect::<Vec<f64>>();
+    let [values, places] = [0, 1].map(values);
+    let uniform = uniformity(&places).unwrap_or_default();
     let below = |level: f64| values.iter().filter(|p| **p <= level).count() as f64 / values.len() as f64;
     let binomial_p = binomial_two_sided(pairs, different, ALPHA);
     Rate {

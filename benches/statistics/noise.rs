@@ -77,7 +77,7 @@ pub enum Colour {
     Mixed,
 }
 
-/// A picture of brightness 1 in halves of `spp` / 2 samples. The noise of a sample has a deviation of 0.5 in every eleventh
+/// A picture of brightness 1 in halves of `spp` / 2 samples, or one more in the first. The noise of a sample has a deviation of 0.5 in every eleventh
 /// column, of 0.02 to 0.032 in others, and of 0 in the sky at the top.
 pub fn picture(side: usize, seed: u64, spp: usize, noise: Noise, colour: Colour) -> Replicates {
     let mut s = Stream::new(seed);
@@ -86,15 +86,15 @@ pub fn picture(side: usize, seed: u64, spp: usize, noise: Noise, colour: Colour)
         (x, _) if x % 11 == 0 => 0.5,
         (x, y) => 0.02 + 0.002 * ((x + y) % 7) as f64,
     };
-    let count = spp as f64 / 2.0;
-    let mut half = || {
+    let mut half = |samples: usize| {
+        let count = samples as f64;
         let pixel = |i: usize| {
             let sigma = deviation(i % side, i / side);
             let mut sum = [0.0; 3];
             // The mean of normal samples is a normal one.
             let (draws, scale) = match noise {
                 Noise::Normal => (1, 1.0 / count.sqrt()),
-                _ => (spp / 2, 1.0 / count),
+                _ => (samples, 1.0 / count),
             };
             for _ in 0..if sigma > 0.0 { draws } else { 0 } {
                 let common = noise.draw(&mut s);
@@ -110,6 +110,6 @@ pub fn picture(side: usize, seed: u64, spp: usize, noise: Noise, colour: Colour)
         let means: Vec<[f32; 3]> = (0..side * side).map(pixel).collect();
         (means, Some(vec![count as f32; side * side]))
     };
-    let parts = vec![half(), half()];
+    let parts = vec![half(spp.div_ceil(2)), half(spp / 2)];
     Replicates::of_values([side, side], Spread::Pixels, parts)
 }

@@ -1,7 +1,6 @@
 //! Ambient occlusion: the cosine-weighted share of the hemisphere from which nothing near blocks.
 
-use super::path::first_hit;
-use super::{CameraBatch, Integrator, PathResults, Workspace};
+use super::{CameraBatch, FirstHit, Integrator, PathResults, Workspace};
 use crate::base::ray::{Coherence, Ray};
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
 use crate::color::Rgb;
@@ -46,7 +45,7 @@ impl Integrator for AmbientOcclusion {
             let v = scene.vertex(&batch.rays.get(i), hit, batch.spread);
             out.alpha[i] = 1.0;
             if batch.want_first {
-                out.first[i] = Some(first_hit(scene, v));
+                out.first[i] = Some(FirstHit::new(scene, v));
             }
             let id = batch.ids.get(i);
             let u = id.sampler.get_2d(id.index, Dim::at(1, Slot::BsdfUv));

@@ -2,8 +2,7 @@
 //! form. No shadows and no noise, so it is the oracle for integrators that sample the same lights.
 
 use super::escapes::Escapes;
-use super::path::first_hit;
-use super::{CameraBatch, Integrator, PathResults, Workspace};
+use super::{CameraBatch, FirstHit, Integrator, PathResults, Workspace};
 use crate::base::light::PathEnd;
 use crate::base::material::Prepared;
 use crate::base::ray::Coherence;
@@ -41,7 +40,7 @@ impl Integrator for Analytic {
             out.alpha[i] = 1.0;
             out.li[i] = shade(scene, &v);
             if batch.want_first {
-                out.first[i] = Some(first_hit(scene, v));
+                out.first[i] = Some(FirstHit::new(scene, v));
             }
         }
         escapes.add_background(scene, &mut out.li);

@@ -25,6 +25,7 @@ pub mod whitted;
 pub use avoided::Avoided;
 
 use crate::base::hit::HitBatch;
+use crate::base::material::Prepared;
 use crate::base::pixel_rect::PixelRect;
 use crate::base::ray::RayBatch;
 use crate::base::registry::Row;
@@ -108,13 +109,23 @@ impl PathIds {
     }
 }
 
-/// The first surface of a path, from which AOVs read.
+/// A surface that the camera sees, from which AOVs read.
 #[derive(Debug, Clone, Copy)]
 pub struct FirstHit {
     /// The surface point.
     pub vertex: Vertex,
     /// The material's albedo there.
     pub albedo: Rgb,
+}
+
+impl FirstHit {
+    /// A surface point with its material.
+    pub fn new(scene: &Scene, vertex: Vertex) -> FirstHit {
+        let material = scene.material(&vertex);
+        let mut prepared = Prepared::default();
+        material.prepare(&vertex, &mut prepared);
+        FirstHit { vertex, albedo: material.albedo(&prepared, vertex.frame.to_local(vertex.wo)) }
+    }
 }
 
 /// What a block of paths brings back, one entry a path.

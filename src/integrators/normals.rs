@@ -1,7 +1,6 @@
 //! Shading normals as colours, for looking at geometry.
 
-use super::path::first_hit;
-use super::{CameraBatch, Integrator, PathResults, Workspace};
+use super::{CameraBatch, FirstHit, Integrator, PathResults, Workspace};
 use crate::base::ray::Coherence;
 use crate::base::registry::{Params, Row};
 use crate::color::Rgb;
@@ -32,7 +31,7 @@ impl Integrator for Normals {
             out.li[i] = Rgb::new(c.x, c.y, c.z);
             out.alpha[i] = 1.0;
             if batch.want_first {
-                out.first[i] = Some(first_hit(scene, v));
+                out.first[i] = Some(FirstHit::new(scene, v));
             }
         }
     }

@@ -12,10 +12,8 @@ use super::together::Together;
 use super::{CameraBatch, FirstHit, Integrator, PathResults, PilotPlan, Specialised, Workspace, pilot};
 use crate::base::hit::{HitBatch, NO_PRIMITIVE};
 use crate::base::light::Receiver;
-use crate::base::material::Prepared;
 use crate::base::ray::{Coherence, RayBatch};
 use crate::base::registry::{ParamKind, ParamSpec, Params, Row, Value};
-use crate::base::vertex::Vertex;
 use crate::color::Rgb;
 use crate::error::Result;
 use crate::scene::{Meetings, Scene};
@@ -285,7 +283,7 @@ impl PathTracer {
             for s in found.surfaces.iter() {
                 out.alpha[s.state.index as usize] = 1.0;
                 if batch.want_first {
-                    out.first[s.state.index as usize] = Some(first_hit(scene, s.v));
+                    out.first[s.state.index as usize] = Some(FirstHit::new(scene, s.v));
                 }
                 block.add_emission(&s.state, &s.v, -s.v.wo, out);
             }
@@ -293,7 +291,7 @@ impl PathTracer {
                 for (lane, &i) in paths.hits[like.range()].iter().enumerate() {
                     out.alpha[i as usize] = 1.0;
                     if batch.want_first {
-                        out.first[i as usize] = Some(first_hit(scene, like.vertices.get(lane)));
+                        out.first[i as usize] = Some(FirstHit::new(scene, like.vertices.get(lane)));
                     }
                 }
             }
@@ -364,12 +362,4 @@ impl PathScratch {
         next.clear();
         shadow.clear();
     }
-}
-
-/// The record of a first surface for AOVs.
-pub(super) fn first_hit(scene: &Scene, v: Vertex) -> FirstHit {
-    let material = scene.material(&v);
-    let mut prepared = Prepared::default();
-    material.prepare(&v, &mut prepared);
-    FirstHit { vertex: v, albedo: material.albedo(&prepared, v.frame.to_local(v.wo)) }
 }

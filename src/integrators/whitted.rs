@@ -3,9 +3,8 @@
 //! Light between diffuse surfaces is left out; every material and light may take part.
 
 use super::escapes::Escapes;
-use super::path::first_hit;
 use super::pending::{Pending, ShadowRays, add_arriving};
-use super::{CameraBatch, Integrator, PathId, PathResults, Workspace, light_dim};
+use super::{CameraBatch, FirstHit, Integrator, PathId, PathResults, Workspace, light_dim};
 use crate::base::hit::HitBatch;
 use crate::base::light::{LightSample, PathEnd, Receiver};
 use crate::base::material::{Material, Prepared};
@@ -128,7 +127,7 @@ impl Integrator for Whitted {
                 if depth == 1 {
                     out.alpha[i] = 1.0;
                     if batch.want_first {
-                        out.first[i] = Some(first_hit(scene, v));
+                        out.first[i] = Some(FirstHit::new(scene, v));
                     }
                 }
                 let spot = Spot::new(scene, v, *chain, batch.ids.get(chain.index as usize), depth);

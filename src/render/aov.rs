@@ -1,4 +1,4 @@
-//! Layers beside the picture, read from the first surface of each path.
+//! Layers beside the picture, read from the surfaces that the camera sees.
 
 use super::film_layers;
 use crate::base::intersectable::QueryKind;
@@ -12,8 +12,9 @@ use crate::scene::Scene;
 pub enum Combine {
     /// Mean over the samples that hit something.
     Mean,
-    /// The pixel's first sample alone, for values that cannot be averaged.
-    First,
+    /// What the ray through the pixel's centre meets, for values that cannot be averaged. No sample's: which object a sample
+    /// met tells something of the sample, and pixels that are chosen by it have another mean.
+    Centre,
 }
 
 /// A registered layer.
@@ -28,11 +29,11 @@ pub struct AovRow {
     pub full_precision: bool,
     /// See [`Combine`].
     pub combine: Combine,
-    /// The value at a first surface; as many entries count as there are channels.
+    /// The value at a surface that the camera sees; as many entries count as there are channels.
     pub eval: fn(&FirstHit, &Scene) -> [f32; 4],
 }
 
-/// Every layer that reads first surfaces. [`film_layers`] holds those of the film itself.
+/// Every layer that reads such surfaces. [`film_layers`] holds those of the film itself.
 pub static REGISTRY: &[AovRow] = &[
     AovRow {
         name: "albedo",
@@ -74,10 +75,10 @@ pub static REGISTRY: &[AovRow] = &[
     },
     AovRow {
         name: "id",
-        doc: "number of the object, from 1 in the order of `skylit info`; 0 where there is none",
+        doc: "number of the object at the pixel's centre, from 1 in the order of `skylit info`; 0 where there is none",
         channels: &["V"],
         full_precision: true,
-        combine: Combine::First,
+        combine: Combine::Centre,
         eval: |h, _| [h.vertex.object as f32 + 1.0, 0.0, 0.0, 0.0],
     },
     AovRow {

@@ -1,5 +1,6 @@
 //! The unit of work of a thread: a tile of pixels, its samples dealt out in batches of camera rays.
 
+use super::aov::Combine;
 use super::backdrop::Backdrop;
 use super::coverage::Coverage;
 use super::dealing::{Counts, Kind, Note, Spent};
@@ -9,7 +10,8 @@ use super::outlines::Outlines;
 use super::settings::RenderSettings;
 use crate::base::camera::FilmSamples;
 use crate::base::pixel_rect::PixelRect;
-use crate::integrators::{CameraBatch, Integrator, PathId, PathIds, PathResults, Workspace};
+use crate::base::ray::Coherence;
+use crate::integrators::{CameraBatch, FirstHit, Integrator, PathId, PathIds, PathResults, Workspace};
 use crate::math::simd;
 use crate::sampler::{Dim, PointSet, points_2d, ray_key};
 use crate::scene::Scene;
@@ -207,6 +209,9 @@ impl Worker {
             }
             self.flush(job);
         }
+        if range.start == 0 && self.layers.has(Combine::Centre) {
+            self.look_at_centres(job, rect);
+        }
         self.spent = Spent { plain: middle.since(&start), outlines: self.work.counts.since(&middle) };
     }
 
@@ -310,7 +315,7 @@ impl Worker {
 
     fn start_batch(&mut self, job: &Job) {
         self.batch.spread = job.scene.camera.pixel_spread();
-        self.batch.want_first = !job.settings.aovs.is_empty();
+        self.batch.want_first = self.layers.has(Combine::Mean);
         self.batch.times = 1;
     }
 
@@ -349,10 +354,30 @@ impl Worker {
             self.report_bad(run);
         }
         if self.batch.want_first {
-            let starts_pixel = run.replicate == 0 && run.first_index == 0;
-            for (i, hit) in self.results.first[range].iter().enumerate() {
-                if let Some(hit) = hit {
-                    self.layers.add(run.x, run.y, hit, starts_pixel && i == 0, job.scene);
+            for hit in self.results.first[range].iter().flatten() {
+                self.layers.add(run.x, run.y, hit, Combine::Mean, job.scene);
+            }
+        }
+    }
+
+    /// Adds what rays through the pixels' centres, and the lens's, meet.
+    fn look_at_centres(&mut self, job: &Job, rect: PixelRect) {
+        let pixels: Vec<(u32, u32)> = rect.pixels().collect();
+        for pixels in pixels.chunks(BATCH) {
+            let (x, y): (Vec<f32>, Vec<f32>) =
+                pixels.iter().map(|&(x, y)| (x as f32 + 0.5, y as f32 + 0.5)).unzip();
+            let middle = vec![0.5; if job.scene.camera.has_lens() { pixels.len() } else { 0 }];
+            let samples = FilmSamples { x: &x, y: &y, lens_u: &middle, lens_v: &middle };
+            let rays = &mut self.batch.rays;
+            rays.resize(pixels.len());
+            pixels.iter().zip(&mut rays.key).for_each(|(&(x, y), key)| *key = ray_key(x, y, 1));
+            job.scene.camera.fill_rays(&samples, rays);
+            self.work.counts.camera += pixels.len() as u64;
+            job.scene.kernel.intersect_batch(rays, &mut self.work.hits, Coherence::Coherent);
+            for (i, &(x, y)) in pixels.iter().enumerate() {
+                if let Some(hit) = self.work.hits.get(i) {
+                    let vertex = job.scene.vertex(&rays.get(i), hit, self.batch.spread);
+                    self.layers.add(x, y, &FirstHit::new(job.scene, vertex), Combine::Centre, job.scene);
                 }
             }
         }

@@ -29,14 +29,17 @@ impl Layers {
         self.layers.iter_mut().for_each(|(_, sums)| sums.reset(window));
     }
 
-    /// Adds a sample's first surface; `is_first` marks the pixel's very first sample.
-    pub fn add(&mut self, x: u32, y: u32, hit: &FirstHit, is_first: bool, scene: &Scene) {
-        for (row, sums) in &mut self.layers {
-            if row.combine == Combine::Mean || is_first {
-                // A value that is not finite has no place in a mean; the picture's own samples are checked apart.
-                sums.add::<CHANNELS>(x, y, (row.eval)(hit, scene));
-            }
+    /// Adds the surface that a sample, or the ray through the pixel's centre, meets to the layers that are made of these.
+    pub fn add(&mut self, x: u32, y: u32, hit: &FirstHit, of: Combine, scene: &Scene) {
+        for (row, sums) in self.layers.iter_mut().filter(|(row, _)| row.combine == of) {
+            // A value that is not finite has no place in a mean; the picture's own samples are checked apart.
+            sums.add::<CHANNELS>(x, y, (row.eval)(hit, scene));
         }
+    }
+
+    /// Whether there is a layer of that kind.
+    pub fn has(&self, of: Combine) -> bool {
+        self.layers.iter().any(|(row, _)| row.combine == of)
     }
 
     /// Adds a tile's sums.

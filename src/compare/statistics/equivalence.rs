@@ -76,7 +76,7 @@ const CHANNELS: [&str; 3] = ["R", "G", "B"];
 /// A reference that is black.
 pub fn ask(pair: &Pair, pixels: &[u32], margin: f64, levels: Levels) -> Result<Equivalence> {
     let at = |scale: f64| {
-        let scaled = Pair { scale: pair.scale * scale, ..*pair };
+        let scaled = Pair { scale: pair.scale * scale, ways: 0, ..*pair };
         examine(&scaled, pixels)
     };
     let [low, middle, high] = [1.0 - margin, 1.0, 1.0 + margin].map(at);

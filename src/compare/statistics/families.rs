@@ -1,6 +1,9 @@
 //! What many probabilities say together.
 
+use super::Question;
 use super::distributions::kolmogorov_tail;
+use super::replicates::Replicates;
+use super::results::FamilyLine;
 use std::f64::consts::PI;
 
 /// The probability of Simes (1986): the least of n p_k / k over the sorted p_k. Uniform for independent p; for tests that go
@@ -32,6 +35,41 @@ pub fn combined(ps: &[(f64, f64)]) -> f64 {
     // A p of exactly 1 would veto whatever the others say.
     let sum: f64 = ps.iter().map(|(weight, p)| weight * term(p.min(1.0 - 1e-4))).sum();
     if sum > 1e8 { 1.0 / (sum * PI) } else { 0.5 - sum.atan() / PI }
+}
+
+/// What each family counts for the verdict.
+pub(super) struct Weights {
+    pub whole: f64,
+    pub tiles: f64,
+    pub regions: f64,
+}
+
+impl Weights {
+    /// Alike for those that there are.
+    pub fn of(reference: &Replicates, question: &Question) -> Weights {
+        let has_tiles = reference.size[0].max(reference.size[1]) > question.tile;
+        let has_regions = reference.objects.is_some() || !question.masks.is_empty();
+        let families = 1.0 + f64::from(u8::from(has_tiles)) + f64::from(u8::from(has_regions));
+        let share = |has: bool| if has { 1.0 / families } else { 0.0 };
+        Weights { whole: share(true), tiles: share(has_tiles), regions: share(has_regions) }
+    }
+
+    /// Those that have something to say, with their weights scaled to 1, and their combination; from the probabilities of
+    /// the whole, the tiles and the other regions.
+    pub fn verdict(&self, [whole, tiles, regions]: [Vec<f64>; 3]) -> (Vec<FamilyLine>, Option<f64>) {
+        let named =
+            [("whole", self.whole, whole), ("tiles", self.tiles, tiles), ("objects", self.regions, regions)];
+        let mut lines: Vec<FamilyLine> = named
+            .into_iter()
+            .filter(|(_, weight, ps)| *weight > 0.0 && !ps.is_empty())
+            .map(|(name, weight, ps)| FamilyLine { name, tests: ps.len(), weight, p: simes(&ps) })
+            .collect();
+        let sum: f64 = lines.iter().map(|l| l.weight).sum();
+        lines.iter_mut().for_each(|l| l.weight /= sum);
+        let terms: Vec<(f64, f64)> = lines.iter().map(|l| (l.weight, l.p)).collect();
+        let p = (!terms.is_empty()).then(|| combined(&terms));
+        (lines, p)
+    }
 }
 
 /// How p-values of parts without a difference are spread over 0 to 1.

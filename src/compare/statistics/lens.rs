@@ -94,11 +94,15 @@ impl Lens {
         }
     }
 
-    /// Whether a difference reaches, beyond rounding, into directions without noise.
-    pub fn leaves(&self, difference: [f64; 3], tolerance: [f64; 3]) -> bool {
+    /// Whether a pixel's difference reaches, beyond rounding, into directions without noise; the pixel's own items do not:
+    /// beside a very bright pixel, whose rounding is coarse, there may be more noise in others than that.
+    pub fn leaves(&self, difference: [f64; 3], items: &[Item], tolerance: [f64; 3]) -> bool {
         let along = |u: &[f64; 3], v: [f64; 3]| (0..3).map(|c| u[c] * v[c] / self.scale[c]).sum::<f64>();
         let most = |u: &[f64; 3]| (0..3).map(|c| u[c].abs() * tolerance[c] / self.scale[c]).sum::<f64>();
-        self.dropped.iter().any(|u| along(u, difference).abs() > 2.0 * most(u))
+        self.dropped.iter().any(|u| {
+            let reaches = |v: [f64; 3]| along(u, v).abs() > 2.0 * most(u);
+            reaches(difference) && !items.iter().any(|i| reaches(i.value))
+        })
     }
 }
 

@@ -16,6 +16,9 @@ const DEPENDENT_DEVIATES: f64 = 8.0;
 /// ... and by such a share of all.
 const DEPENDENT_SHARE: f64 = 0.05;
 
+/// Numbers of samples are unlike if they differ by this factor.
+const UNLIKE: f64 = 1.5;
+
 /// What is random in what.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -54,6 +57,10 @@ pub struct Pair<'a> {
     pub scale: f64,
     /// What two numbers that are meant to be the same may differ by, relatively.
     pub(super) digits: f64,
+    /// How many times the reference's samples the test has, where both are known and unlike.
+    pub(super) ratio: Option<f64>,
+    /// Contrasts of a pixel, see [`super::exchange`]; 0 if halves cannot be dealt anew.
+    pub(super) ways: usize,
 }
 
 /// A pixel of both.
@@ -100,8 +107,16 @@ impl<'a> Pair<'a> {
             )));
         }
         let digits = f64::from(reference.digits.max(test.digits));
-        let mut pair =
-            Pair { reference, test, design: Design::Independent, reason: Reason::Apart, scale: 1.0, digits };
+        let mut pair = Pair {
+            reference,
+            test,
+            design: Design::Independent,
+            reason: Reason::Apart,
+            scale: 1.0,
+            digits,
+            ratio: None,
+            ways: 0,
+        };
         let alike = reference.len() == test.len() && reference.spread == test.spread;
         (pair.design, pair.reason) = match design {
             Some(Design::Paired) if !alike => {
@@ -116,7 +131,16 @@ impl<'a> Pair<'a> {
             None if alike && pair.share_noise() => (Design::Paired, Reason::SameNoise),
             None => (Design::Independent, Reason::Apart),
         };
+        pair.ratio = pair.unlike_samples();
+        pair.ways = pair.count_ways();
         Ok(pair)
+    }
+
+    fn unlike_samples(&self) -> Option<f64> {
+        let samples = |r: &Replicates| if r.spread == Spread::Pixels { r.samples() } else { None };
+        let (m, n) = (samples(self.reference)?, samples(self.test)?);
+        let unlike = m.max(n) >= UNLIKE * m.min(n);
+        (self.design == Design::Independent && unlike).then_some(n / m)
     }
 
     fn same_seed(&self) -> bool {
@@ -179,6 +203,11 @@ impl<'a> Pair<'a> {
         }
         let tolerance = [0, 1, 2].map(|c| self.digits * reference[c].abs().max(test[c].abs()) + STEP);
         Ok(Visit { reference, test, tolerance })
+    }
+
+    /// Whether a pixel is used and has noise, or a difference beyond rounding; `items` is for its use.
+    pub(super) fn varies(&self, pixel: usize, items: &mut Vec<Item>) -> bool {
+        self.visit(pixel, items).is_ok_and(|visit| !visit.is_quiet(items))
     }
 
     /// Mean of the reference and of the differences of its replicates from those of the test.
@@ -258,6 +287,12 @@ impl Visit {
     /// Test less reference.
     pub fn difference(&self) -> [f64; 3] {
         [0, 1, 2].map(|c| self.test[c] - self.reference[c])
+    }
+
+    /// Whether nothing varies, and nothing differs, beyond rounding.
+    pub fn is_quiet(&self, items: &[Item]) -> bool {
+        let is_still = |i: &Item| (0..3).all(|c| i.value[c].abs() <= self.tolerance[c]);
+        items.iter().all(is_still) && self.is_within_tolerance()
     }
 
     /// Whether rounding explains the difference.

@@ -94,7 +94,11 @@ impl StatisticalResult {
             Reason::SameNoise => "their noise goes together",
             Reason::Told => "as was asked",
         };
-        format!("{what}: {why}")
+        let dealt = match self.deals {
+            0 => String::new(),
+            n => format!("; halves dealt anew {n} times"),
+        };
+        format!("{what}: {why}{dealt}")
     }
 
     /// p-values of tiles by twentieths, for a report: alike where there is no difference.

@@ -8,6 +8,10 @@
 //! have a V of rank 1. So V is first scaled by what rounding may do to each channel; directions with less variance than
 //! that are left out, and p is the number of those that stay.
 //!
+//! Where halves can be dealt anew, their covariance U over all deals takes the place of V ([`super::exchange`]): it is known,
+//! and p goes by chi-square, until [deals](super::deals) tell better. All below is for other pairs, and for the errors of
+//! single channels.
+//!
 //! # Degrees of freedom
 //!
 //! The items have unlike covariances W_i: the noise of a shadow's edge is not that of the floor. In the manner of Nel and
@@ -23,10 +27,12 @@
 //! q_i <= 1 and sum q_i = p, f is p at least, where p pixels have all the noise. Heavy tails raise the sum of q_i^2, and so
 //! lower f: a pixel that outweighs all others is not taken for a significant one.
 
+use super::distributions::{chi_square_tail, f_tail};
+use super::exchange::whiten;
 use super::lens::{CONTRASTS, Lens, freedom};
 use super::matrix::{Mat, add_outer, dot, quadratic};
 use super::pair::{Design, Item, Pair, Running, Use};
-use super::replicates::{Replicates, Spread};
+use super::replicates::Spread;
 use rayon::prelude::*;
 
 /// Pixels that are summed in one go; sums of such runs are added in order.
@@ -38,9 +44,6 @@ const JOINT_FREEDOM: f64 = 8.0;
 /// Pixels without noise that differ must be so many before that is called a difference: one or two on an edge may have
 /// found the same in both halves by chance, but not as many with nothing beside them that varies.
 pub const STILL: usize = 16;
-
-/// Numbers of samples are unlike if they differ by this factor.
-const UNLIKE: f64 = 1.5;
 
 /// A difference with its error along one mixture of channels.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -76,24 +79,31 @@ pub struct Finding {
     pub t2: f64,
     /// Degrees of freedom of the covariance.
     pub freedom: f64,
+    /// Whether `t2` is by the covariance of all deals ([`super::exchange`]), which is known, and not by its estimate.
+    pub is_known: bool,
     /// Red, green, blue, luminance.
     pub contrasts: [Contrast; 4],
     /// Squared length, in units of the noise, of the reference's sum: what a bias of 100 % in all channels would bring.
     pub strength: f64,
     /// Whether the picture with fewer samples was given, along some mixture of channels, the noise that the other foretells.
     pub borrowed: bool,
+    /// Rows that make a difference's noise round.
+    pub white: Vec<[f64; 3]>,
 }
 
 impl Finding {
     /// Degrees of freedom of F.
     pub fn denominator(&self) -> f64 {
-        self.freedom - self.rank as f64 + 1.0
+        if self.is_known { f64::INFINITY } else { self.freedom - self.rank as f64 + 1.0 }
     }
 
     /// How often chance alone brings as much or more; `None` where nothing varies.
     pub fn p(&self) -> Option<f64> {
         let (p, f) = (self.rank as f64, self.denominator());
-        (self.rank > 0).then(|| super::distributions::f_tail(self.t2 * f / (self.freedom * p), p, f))
+        (self.rank > 0).then(|| match self.is_known {
+            true => chi_square_tail(self.t2, self.rank),
+            false => f_tail(self.t2 * f / (self.freedom * p), p, f),
+        })
     }
 
     /// Whether there is a difference where there is no noise, see [`STILL`].
@@ -113,6 +123,8 @@ struct Sums {
     difference: [f64; 3],
     /// Of the reference's items (or the pairs'), and of the test's.
     covariance: [Mat; 2],
+    /// Of the difference, over all deals.
+    dealt: Mat,
     /// Squared tolerances.
     rounding: [f64; 3],
     /// Sums of each replicate of a side whose pixels are not independent; of the differences, if paired.
@@ -129,6 +141,7 @@ impl Sums {
         vector(&mut self.reference, &o.reference);
         vector(&mut self.difference, &o.difference);
         vector(&mut self.rounding, &o.rounding);
+        (0..3).for_each(|i| vector(&mut self.dealt[i], &o.dealt[i]));
         for side in 0..2 {
             (0..3).for_each(|i| vector(&mut self.covariance[side][i], &o.covariance[side][i]));
             self.parts[side].resize(o.parts[side].len().max(self.parts[side].len()), [0.0; 3]);
@@ -156,7 +169,7 @@ pub fn examine(pair: &Pair, pixels: &[u32]) -> Finding {
         add_outer(&mut sums.covariance[usize::from(item.of_test)], item.value, 1.0);
     }
     let joint = whole.is_empty() || picture_freedom(pair, sides) >= JOINT_FREEDOM;
-    let lens = Lens::new(&sums.covariance, &sums.rounding, ratio(pair), joint);
+    let lens = Lens::new(&sums.covariance, &sums.rounding, pair.ratio, joint);
     let fourths = in_order(
         pixels,
         |run| second_sums(pair, run, sides, &lens),
@@ -168,8 +181,11 @@ pub fn examine(pair: &Pair, pixels: &[u32]) -> Finding {
             a.largest_still = a.largest_still.max(b.largest_still);
         },
     );
-    let rank = lens.white.len();
     let of_all = freedom(&lens.white, &lens.counts, fourths.q2, &whole);
+    let (white, is_known) = match pair.ways {
+        0 => (lens.white.clone(), false),
+        _ => (whiten(&sums.dealt, &lens), true),
+    };
     let contrast = |k: usize| {
         let along = CONTRASTS[k];
         let sides = sums.covariance.map(|m| quadratic(&m, along).max(0.0));
@@ -185,7 +201,7 @@ pub fn examine(pair: &Pair, pixels: &[u32]) -> Finding {
             freedom: if variance > 0.0 { freedom(&white, &[counts], fourth, &whole) } else { 1.0 },
         }
     };
-    let length2 = |v: [f64; 3]| lens.white.iter().map(|w| dot(*w, v).powi(2)).sum::<f64>();
+    let length2 = |v: [f64; 3]| white.iter().map(|w| dot(*w, v).powi(2)).sum::<f64>();
     Finding {
         pixels: sums.pixels,
         not_finite: sums.not_finite,
@@ -193,12 +209,14 @@ pub fn examine(pair: &Pair, pixels: &[u32]) -> Finding {
         quiet: sums.quiet,
         still: fourths.still,
         largest_still: fourths.largest_still,
-        rank,
+        rank: white.len(),
         t2: length2(sums.difference),
         freedom: of_all,
+        is_known,
         contrasts: [0, 1, 2, 3].map(contrast),
         strength: length2(sums.reference),
         borrowed: lens.counts.iter().flatten().any(|c| *c == 0.0),
+        white,
     }
 }
 
@@ -225,11 +243,6 @@ fn in_order<T: Send + Sync>(
     all
 }
 
-/// Whether nothing varies, and nothing differs, beyond rounding.
-fn is_still(items: &[Item], tolerance: &[f64; 3]) -> bool {
-    items.iter().all(|i| (0..3).all(|c| i.value[c].abs() <= tolerance[c]))
-}
-
 fn first_sums(pair: &Pair, pixels: &[u32], pictures: [bool; 2]) -> Sums {
     let (mut sums, mut items) = (Sums::default(), Vec::new());
     for (side, of) in [pair.reference, pair.test].into_iter().enumerate().filter(|(side, _)| pictures[*side])
@@ -251,12 +264,16 @@ fn first_sums(pair: &Pair, pixels: &[u32], pictures: [bool; 2]) -> Sums {
         sums.pixels += 1;
         let difference = visit.difference();
         (0..3).for_each(|c| sums.reference[c] += visit.reference[c]);
-        if is_still(&items, &visit.tolerance) && visit.is_within_tolerance() {
+        if visit.is_quiet(&items) {
             sums.quiet += 1;
             continue;
         }
         (0..3).for_each(|c| sums.difference[c] += difference[c]);
         (0..3).for_each(|c| sums.rounding[c] += visit.tolerance[c] * visit.tolerance[c]);
+        if pair.ways > 0 {
+            let weight = 1.0 / pair.ways as f64;
+            pair.contrasts(pixel as usize).iter().for_each(|c| add_outer(&mut sums.dealt, *c, weight));
+        }
         for item in items.iter().filter(|i| !pictures[usize::from(i.of_test)]) {
             add_outer(&mut sums.covariance[usize::from(item.of_test)], item.value, 1.0);
         }
@@ -293,23 +310,15 @@ fn picture_freedom(pair: &Pair, pictures: [bool; 2]) -> f64 {
     (0..2).filter(|side| pictures[*side]).map(|side| of[side].len() as f64 - 1.0).sum()
 }
 
-/// How many times the reference's samples the test has, where both are known and unlike.
-fn ratio(pair: &Pair) -> Option<f64> {
-    let samples = |r: &Replicates| if r.spread == Spread::Pixels { r.samples() } else { None };
-    let (m, n) = (samples(pair.reference)?, samples(pair.test)?);
-    let unlike = m.max(n) >= UNLIKE * m.min(n);
-    (pair.design == Design::Independent && unlike).then_some(n / m)
-}
-
 fn second_sums(pair: &Pair, pixels: &[u32], pictures: [bool; 2], lens: &Lens) -> Fourths {
     let (mut sums, mut items) = (Fourths::default(), Vec::new());
     for &pixel in pixels {
         let Ok(visit) = pair.visit(pixel as usize, &mut items) else { continue };
-        if is_still(&items, &visit.tolerance) && visit.is_within_tolerance() {
+        if visit.is_quiet(&items) {
             continue;
         }
         let difference = visit.difference();
-        if !lens.dropped.is_empty() && lens.leaves(difference, visit.tolerance) {
+        if !lens.dropped.is_empty() && lens.leaves(difference, &items, visit.tolerance) {
             sums.still += 1;
             let largest = difference.iter().fold(0.0f64, |m, d| m.max(d.abs()));
             sums.largest_still = sums.largest_still.max(largest);

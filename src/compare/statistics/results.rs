@@ -1,5 +1,6 @@
 //! What a test for bias brings back.
 
+use super::deals::Standing;
 use super::distributions::{non_centrality, student_quantile};
 use super::equivalence::Equivalence;
 use super::families::Uniformity;
@@ -69,6 +70,9 @@ pub struct Region {
     pub place: Place,
     /// How often chance alone brings as much; none where nothing varies.
     pub p: Option<f64>,
+    /// Where it stands among deals of the same halves, ties by lot: uniform from 0 to 1 where nothing differs, whatever the
+    /// noise. None where there were no deals.
+    pub place_among_deals: Option<f64>,
     /// Whether it is rejected beside its like, or differs exactly.
     pub rejected: bool,
     /// Whether it differs where there is no noise.
@@ -154,6 +158,8 @@ pub struct StatisticalResult {
     pub quiet: usize,
     /// Replicates of the reference and of the test.
     pub replicates: [usize; 2],
+    /// How often halves were dealt anew; 0 where that is not possible, or there is no need.
+    pub deals: usize,
     /// Width and height in pixels.
     pub size: [usize; 2],
     /// Side of a tile.
@@ -161,6 +167,14 @@ pub struct StatisticalResult {
 }
 
 impl Region {
+    /// What deals say, with a lot for its place among them.
+    pub(super) fn set_standing(&mut self, standing: &Standing, lot: f64) {
+        if self.p.is_some() {
+            self.p = Some(standing.p());
+            self.place_among_deals = Some(standing.place(lot));
+        }
+    }
+
     /// `level`: of this test alone; 0 where it does not matter what would have been seen.
     pub(super) fn new(place: Place, finding: Finding, level: f64) -> Region {
         let share = |k: usize| Share::of(&finding.contrasts[k]);
@@ -172,6 +186,7 @@ impl Region {
             .filter(|b| b.is_finite());
         Region {
             p: finding.p(),
+            place_among_deals: None,
             rejected: false,
             exact: finding.is_exact(),
             luminance,
