@@ -1,14 +1,15 @@
 //! Chromium without a window, asked through its DevTools protocol (<https://chromedevtools.github.io/devtools-protocol/>):
-//! one browser for all tests, and for each test a tab with a connection of its own. Every wait has an end.
+//! one browser for all tests, through a pipe, and for each test a tab with a session of its own. Every wait has an end.
 
 use super::tab::Tab;
 use serde_json::{Value, json};
-use std::net::TcpStream;
-use std::path::PathBuf;
-use std::process::{Child, ChildStdin, Command, Stdio};
-use std::sync::LazyLock;
+use std::collections::HashMap;
+use std::io::{BufRead, BufReader, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{LazyLock, Mutex};
 use std::time::{Duration, Instant};
-use tungstenite::{Message, WebSocket};
 
 /// How long anything may take: far more than it does, even where every core is busy.
 pub const PATIENCE: Duration = Duration::from_secs(60);
@@ -32,12 +33,12 @@ const FLAGS: [&str; 14] = [
     "--force-color-profile=srgb",
     "--hide-scrollbars",
     "--no-first-run",
-    "--remote-debugging-port=0",
+    "--remote-debugging-pipe",
 ];
 
-/// Runs "$@" until standard input ends, which it does when the tests' process does, in whatever way; then nothing is left.
-const LEASH: &str = r#"profile="$1"; shift; "$@" </dev/null >/dev/null 2>"$profile/log" & browser=$!
-cat >/dev/null; kill "$browser"; wait "$browser"
+/// Runs "$@", which reads commands from descriptor 3 and answers to 4. It ends with its commands, which end when the tests'
+/// process does, in whatever way; then nothing is left.
+const LEASH: &str = r#"profile="$1"; shift; "$@" 3<&0 4>&1 </dev/null >/dev/null 2>"$profile/log"
 # Its children end a little later, and may write until then.
 for _ in 1 2 3 4 5 6 7 8 9 10; do rm -rf "$profile" 2>/dev/null && break; sleep 0.2; done"#;
 
@@ -45,10 +46,21 @@ for _ in 1 2 3 4 5 6 7 8 9 10; do rm -rf "$profile" 2>/dev/null && break; sleep 
 static BROWSER: LazyLock<Option<Browser>> = LazyLock::new(|| program().map(Browser::launch));
 
 struct Browser {
-    url: String,
-    // Held open for as long as the tests run: statics are never dropped.
-    _leash: ChildStdin,
+    commands: Mutex<ChildStdin>,
+    routes: Mutex<Routes>,
+    profile: PathBuf,
+    // Held for as long as the tests run: statics are never dropped.
     _shell: Child,
+}
+
+/// Where what the browser says is wanted.
+#[derive(Default)]
+struct Routes {
+    last: u64,
+    /// Answers, by the command's number.
+    answers: HashMap<u64, Sender<Value>>,
+    /// Events, by the session.
+    events: HashMap<String, Sender<Value>>,
 }
 
 /// What `SKYLIT_BROWSER` names, by its path or as the PATH has it, else the first of [`NAMES`].
@@ -74,19 +86,36 @@ impl Browser {
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut shell, 0);
         let mut shell =
-            shell.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-        let leash = shell.stdin.take().expect("piped");
-        let start = Instant::now();
-        loop {
-            let log = std::fs::read_to_string(profile.join("log")).unwrap_or_default();
-            let said = log.split_inclusive('\n').find_map(|l| l.split_once("DevTools listening on "));
-            if let Some((_, url)) = said.filter(|(_, url)| url.ends_with('\n')) {
-                return Browser { url: url.trim().to_owned(), _leash: leash, _shell: shell };
-            }
-            assert!(start.elapsed() < PATIENCE, "{} does not answer:\n{log}", program.display());
-            std::thread::sleep(Duration::from_millis(20));
-        }
+            shell.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+        let (commands, said) = (shell.stdin.take().expect("piped"), shell.stdout.take().expect("piped"));
+        std::thread::spawn(|| listen(said));
+        Browser { commands: Mutex::new(commands), routes: Mutex::default(), profile, _shell: shell }
     }
+
+    fn routes(&self) -> std::sync::MutexGuard<'_, Routes> {
+        self.routes.lock().expect("no thread fails with it")
+    }
+}
+
+/// Hands on what the browser says: messages with a 0 after each.
+fn listen(said: ChildStdout) {
+    for message in BufReader::new(said).split(0).map_while(Result::ok) {
+        let Ok(message) = serde_json::from_slice::<Value>(&message) else { continue };
+        let Some(browser) = BROWSER.as_ref() else { return };
+        let mut routes = browser.routes();
+        let to = match (message["id"].as_u64(), message["sessionId"].as_str()) {
+            (Some(id), _) => routes.answers.remove(&id),
+            (None, Some(session)) => routes.events.get(session).cloned(),
+            _ => None,
+        };
+        // Whoever does not listen any more has what it wanted.
+        to.into_iter().for_each(|to| drop(to.send(message.clone())));
+    }
+}
+
+/// What the browser has written down, if it does not answer.
+fn log(profile: &Path) -> String {
+    std::fs::read_to_string(profile.join("log")).unwrap_or_default()
 }
 
 /// A tab of its own; none, said on the way, where no browser is installed.
@@ -97,41 +126,60 @@ pub fn tab() -> Option<Tab> {
         println!("skipped: no Chromium");
         return None;
     };
-    Some(Tab::new(Connection::open(&browser.url)))
+    Some(Tab::new(Connection::open(browser)))
 }
 
 /// Commands and their answers, and what is told in between.
 pub struct Connection {
-    socket: WebSocket<TcpStream>,
-    last: u64,
+    browser: &'static Browser,
+    told: Receiver<Value>,
+    tell: Sender<Value>,
     /// Of the attached tab; commands go to the browser itself before there is one.
-    pub session: Option<String>,
+    session: Option<String>,
     /// In the order that they came.
     pub events: Vec<Value>,
 }
 
 impl Connection {
-    fn open(url: &str) -> Connection {
-        let host = url.trim_start_matches("ws://").split('/').next().unwrap_or_default();
-        let stream = TcpStream::connect(host).expect("the browser listens");
-        stream.set_read_timeout(Some(PATIENCE)).expect("a time-out");
-        stream.set_nodelay(true).expect("small messages at once");
-        let (socket, _) = tungstenite::client(url, stream).expect("a websocket");
-        Connection { socket, last: 0, session: None, events: Vec::new() }
+    fn open(browser: &'static Browser) -> Connection {
+        let (tell, told) = channel();
+        Connection { browser, told, tell, session: None, events: Vec::new() }
+    }
+
+    /// Further commands go to a tab, and its events come.
+    pub fn attach(&mut self, session: &str) {
+        self.browser.routes().events.insert(session.to_owned(), self.tell.clone());
+        self.session = Some(session.to_owned());
+    }
+
+    /// Further commands go to the browser itself.
+    pub fn detach(&mut self) {
+        if let Some(session) = self.session.take() {
+            self.browser.routes().events.remove(&session);
+        }
     }
 
     /// The answer to a command, or what the browser has against it.
     pub fn try_ask(&mut self, method: &str, params: Value) -> Result<Value, String> {
-        self.last += 1;
-        let mut command = json!({ "id": self.last, "method": method, "params": params });
+        let id = {
+            let mut routes = self.browser.routes();
+            routes.last += 1;
+            let id = routes.last;
+            routes.answers.insert(id, self.tell.clone());
+            id
+        };
+        let mut command = json!({ "id": id, "method": method, "params": params });
         if let Some(session) = &self.session {
             command["sessionId"] = json!(session);
         }
-        self.socket.send(Message::text(command.to_string())).map_err(|e| e.to_string())?;
+        let message = command.to_string() + "\0";
+        let sent =
+            self.browser.commands.lock().expect("no thread fails with it").write_all(message.as_bytes());
+        sent.map_err(|e| format!("{e}\n{}", log(&self.browser.profile)))?;
         let start = Instant::now();
         loop {
             let mut said = self.read()?;
-            if said["id"] == self.last {
+            if said["id"] == id {
                 return if said["error"].is_null() {
                     Ok(said["result"].take())
                 } else {
@@ -163,10 +211,7 @@ impl Connection {
     }
 
     fn read(&mut self) -> Result<Value, String> {
-        loop {
-            if let Message::Text(text) = self.socket.read().map_err(|e| e.to_string())? {
-                return serde_json::from_str(&text).map_err(|e| e.to_string());
-            }
-        }
+        let said = self.told.recv_timeout(PATIENCE);
+        said.map_err(|e| format!("the browser does not answer: {e}\n{}", log(&self.browser.profile)))
     }
 }

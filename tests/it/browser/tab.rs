@@ -40,7 +40,7 @@ impl Tab {
         let target = made["targetId"].as_str().expect("a tab").to_owned();
         let attached =
             connection.ask("Target.attachToTarget", json!({ "targetId": target, "flatten": true }));
-        connection.session = Some(attached["sessionId"].as_str().expect("a session").to_owned());
+        connection.attach(attached["sessionId"].as_str().expect("a session"));
         let mut tab = Tab { connection, target, at: [0.0; 2], held: false };
         for domain in ["Page", "Runtime", "Log", "Network"] {
             tab.ask(&format!("{domain}.enable"), json!({}));
@@ -291,7 +291,7 @@ impl Tab {
 impl Drop for Tab {
     fn drop(&mut self) {
         // What does not close now ends with the browser.
-        self.connection.session = None;
+        self.connection.detach();
         let _ = self.connection.try_ask("Target.closeTarget", json!({ "targetId": self.target }));
     }
 }
