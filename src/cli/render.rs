@@ -72,7 +72,7 @@ struct SamplingArgs {
     #[arg(long, value_name = "NAME")]
     filter: Option<String>,
     /// Pixels that see no geometry: their filter's integral of the sky where that is known to a thousandth, or samples as
-    /// everywhere [default: integrate]
+    /// everywhere [default: integrate; sample with --aov halves]
     #[arg(long, value_name = "integrate|sample")]
     sky_pixels: Option<SkyPixels>,
     /// Samples of pixels that outlines run through, at most, for each of another's (1: as many) [default: 4
@@ -248,7 +248,11 @@ impl SamplingArgs {
                 sampler => sampler,
             },
             filter: plan.filter.unwrap_or(usual.filter),
-            skip_background: self.sky_pixels != Some(SkyPixels::Sample),
+            skip_background: match self.sky_pixels {
+                Some(how) => how == SkyPixels::Integrate,
+                // What is known to a thousandth has no noise that would tell it.
+                None => !plan.output.independent,
+            },
             outlines: self.outlines,
             dealing: self.dealing.unwrap_or_default(),
             threads,

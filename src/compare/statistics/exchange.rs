@@ -22,23 +22,23 @@
 use super::lens::Lens;
 use super::matrix::{Mat, dot, eigen};
 use super::pair::{Design, Pair};
-use super::replicates::Spread;
+use super::replicates::{Replicates, Spread};
 
 /// Contrasts of a pixel at most.
 pub const WAYS: usize = 3;
 
 impl Pair<'_> {
-    /// How many contrasts a pixel has: 3, or 2; 0 if there is no dealing, as pictures do not have two halves each, with as
-    /// many samples as the other's, or noise of their own.
+    /// How many contrasts a pixel has: 3, or 2; 0 if there is no dealing, as pictures do not have halves each, with as many
+    /// samples as the other's, or noise of their own.
     pub(super) fn count_ways(&self) -> usize {
         let sides = [self.reference, self.test];
-        let has_halves = sides.iter().all(|r| r.len() == 2 && r.spread == Spread::Pixels);
-        if self.design != Design::Independent || !has_halves {
+        let has_halves = sides.iter().all(|r| r.len().is_multiple_of(2) && r.spread == Spread::Pixels);
+        if self.design != Design::Independent || !has_halves || sides[0].len() != sides[1].len() {
             return 0;
         }
         let mut ways = WAYS;
         for pixel in 0..self.pixels() {
-            let [a, b] = sides.map(|r| [0, 1].map(|part| r.value(part, pixel).1));
+            let [a, b] = sides.map(|r| [0, 1].map(|h| half(r, h, pixel).1));
             // A pixel that has no spread is left out.
             if a[0].min(a[1]).min(b[0]).min(b[1]) <= 0.0 {
                 continue;
@@ -55,15 +55,27 @@ impl Pair<'_> {
     /// The difference of a pixel as its halves are, and, but for signs, as they might have been dealt. The third is 0 where
     /// there are but two.
     pub(super) fn contrasts(&self, pixel: usize) -> [[f64; 3]; WAYS] {
-        let half = |r: &super::replicates::Replicates, part| r.value(part, pixel);
-        let [(a, m), (a2, n)] = [0, 1].map(|part| half(self.reference, part));
-        let [(b, _), (b2, _)] = [0, 1].map(|part| half(self.test, part));
+        let [(a, m), (a2, n)] = [0, 1].map(|h| half(self.reference, h, pixel));
+        let [(b, _), (b2, _)] = [0, 1].map(|h| half(self.test, h, pixel));
         let (m, n) = (m / (m + n), n / (m + n));
         let make = |f: &dyn Fn(usize) -> f64| [0, 1, 2].map(f);
         let across = |sign: f64| make(&|c| m * (b[c] - a[c]) + sign * n * (b2[c] - a2[c]));
         let within = || make(&|c| 0.5 * ((a[c] - a2[c]) + (b[c] - b2[c])));
         [across(1.0), across(-1.0), if self.ways == WAYS { within() } else { [0.0; 3] }]
     }
+}
+
+/// The mean of every other replicate, and its samples: of two, one or the other.
+fn half(of: &Replicates, h: usize, pixel: usize) -> ([f64; 3], f64) {
+    if of.len() == 2 {
+        return of.value(h, pixel);
+    }
+    let (mut mean, mut count) = ([0.0; 3], 0.0);
+    for (value, n) in (h..of.len()).step_by(2).map(|part| of.value(part, pixel)).filter(|(_, n)| *n > 0.0) {
+        count += n;
+        (0..3).for_each(|c| mean[c] += n / count * (value[c] - mean[c]));
+    }
+    (mean, count)
 }
 
 /// Rows that make U round, within the directions that have noise.

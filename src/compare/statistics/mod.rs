@@ -19,8 +19,9 @@
 //! anew, some hundred times ([`deals`]), and all of the above is asked of each deal. The verdict's probability is the share of
 //! deals that look as different. That is right for every kind of noise, fireflies too, and for however the families go
 //! together. A fit of normal noise ([`region`]) is not: metal under a low sun, where both halves of a pixel may find a
-//! firefly, was called different in 1.62 % of 10,000 pairs by it, noise of rare grey fireflies in 0.15 %. It stays for pictures
-//! that cannot be dealt: unlike numbers of samples, more than two replicates, other programs' pictures, common seeds.
+//! firefly, was called different in 1.62 % of 10,000 pairs by it, noise of rare grey fireflies in 0.15 %. It stays, with
+//! a bound ([`region::Finding::careful`]), for pictures that cannot be dealt: unlike numbers of samples, other programs'
+//! pictures, common seeds.
 //!
 //! A region is a set of pixels that is chosen without a look at the samples. Objects are those at the pixels' centres
 //! (layer `id`); by what a pixel's first sample met, pixels on outlines would be chosen by what makes them bright, and a disc of

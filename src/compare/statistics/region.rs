@@ -10,7 +10,8 @@
 //!
 //! Where halves can be dealt anew, their covariance U over all deals takes the place of V ([`super::exchange`]): it is known,
 //! and p goes by chi-square, until [deals](super::deals) tell better. All below is for other pairs, and for the errors of
-//! single channels.
+//! single channels. Such pairs' p is never better than chi-square's by [`Finding::careful`]: points are spread so evenly over
+//! a pixel that both halves may find the same number of a sun's images, and V then knows nothing of them.
 //!
 //! # Degrees of freedom
 //!
@@ -30,7 +31,7 @@
 use super::distributions::{chi_square_tail, f_tail};
 use super::exchange::whiten;
 use super::lens::{CONTRASTS, Lens, freedom};
-use super::matrix::{Mat, add_outer, dot, quadratic};
+use super::matrix::{Mat, add_outer, dot, eigen, quadratic};
 use super::pair::{Design, Item, Pair, Running, Use};
 use super::replicates::Spread;
 use rayon::prelude::*;
@@ -81,6 +82,9 @@ pub struct Finding {
     pub freedom: f64,
     /// Whether `t2` is by the covariance of all deals ([`super::exchange`]), which is known, and not by its estimate.
     pub is_known: bool,
+    /// Squared distance by a covariance that the differences themselves are a third of; chi-square's probability of it is no
+    /// better than that of F where F is right. Not where whole pictures are replicates.
+    pub careful: Option<f64>,
     /// Red, green, blue, luminance.
     pub contrasts: [Contrast; 4],
     /// Squared length, in units of the noise, of the reference's sum: what a bias of 100 % in all channels would bring.
@@ -102,7 +106,10 @@ impl Finding {
         let (p, f) = (self.rank as f64, self.denominator());
         (self.rank > 0).then(|| match self.is_known {
             true => chi_square_tail(self.t2, self.rank),
-            false => f_tail(self.t2 * f / (self.freedom * p), p, f),
+            false => {
+                let careful = self.careful.map_or(0.0, |t2| chi_square_tail(t2, self.rank));
+                f_tail(self.t2 * f / (self.freedom * p), p, f).max(careful)
+            }
         })
     }
 
@@ -123,7 +130,7 @@ struct Sums {
     difference: [f64; 3],
     /// Of the reference's items (or the pairs'), and of the test's.
     covariance: [Mat; 2],
-    /// Of the difference, over all deals.
+    /// Of the difference, over all deals; its outer products by pixel where halves cannot be dealt.
     dealt: Mat,
     /// Squared tolerances.
     rounding: [f64; 3],
@@ -213,11 +220,28 @@ pub fn examine(pair: &Pair, pixels: &[u32]) -> Finding {
         t2: length2(sums.difference),
         freedom: of_all,
         is_known,
+        careful: (!is_known && whole.is_empty()).then(|| careful(&white, &sums)),
         contrasts: [0, 1, 2, 3].map(contrast),
         strength: length2(sums.reference),
         borrowed: lens.counts.iter().flatten().any(|c| *c == 0.0),
         white,
     }
+}
+
+/// See [`Finding::careful`]: by (2 V + sum d d') / 3, which has the covariance of the sum D of the differences d as its mean, as V has.
+fn careful(white: &[[f64; 3]], sums: &Sums) -> f64 {
+    let mut covariance: Mat = [[0.0; 3]; 3];
+    let mut seen = [0.0; 3];
+    for (i, a) in white.iter().enumerate() {
+        seen[i] = dot(*a, sums.difference);
+        for (j, b) in white.iter().enumerate() {
+            covariance[i][j] = dot(sums.dealt.map(|row| dot(row, *b)), *a) / 3.0;
+        }
+        // V is round here, and counts as what it is worth.
+        covariance[i][i] += 2.0 / 3.0;
+    }
+    let along = eigen(&covariance).into_iter().take(white.len());
+    along.map(|e| dot(e.vector, seen).powi(2) / e.value).sum()
 }
 
 /// Which sides are known by whole pictures alone.
@@ -270,9 +294,12 @@ fn first_sums(pair: &Pair, pixels: &[u32], pictures: [bool; 2]) -> Sums {
         }
         (0..3).for_each(|c| sums.difference[c] += difference[c]);
         (0..3).for_each(|c| sums.rounding[c] += visit.tolerance[c] * visit.tolerance[c]);
-        if pair.ways > 0 {
-            let weight = 1.0 / pair.ways as f64;
-            pair.contrasts(pixel as usize).iter().for_each(|c| add_outer(&mut sums.dealt, *c, weight));
+        match pair.ways {
+            0 => add_outer(&mut sums.dealt, difference, 1.0),
+            ways => {
+                let contrasts = pair.contrasts(pixel as usize);
+                contrasts.iter().for_each(|c| add_outer(&mut sums.dealt, *c, 1.0 / ways as f64));
+            }
         }
         for item in items.iter().filter(|i| !pictures[usize::from(i.of_test)]) {
             add_outer(&mut sums.covariance[usize::from(item.of_test)], item.value, 1.0);

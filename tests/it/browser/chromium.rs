@@ -75,7 +75,6 @@ fn program() -> Option<PathBuf> {
 }
 
 impl Browser {
-    #[expect(clippy::zombie_processes, reason = "it lives as long as this process; the leash ends it")]
     fn launch(program: PathBuf) -> Browser {
         // The shell removes it.
         let profile = tempfile::tempdir().expect("a folder for the profile").keep();
