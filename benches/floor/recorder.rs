@@ -2,7 +2,7 @@
 
 use skylit::Result;
 use skylit::base::hit::{Hit, HitBatch};
-use skylit::base::intersectable::Intersectable;
+use skylit::base::intersectable::{Intersectable, Nothing};
 use skylit::base::ray::{Coherence, Ray, RayBatch};
 use skylit::math::aabb::Aabb;
 use skylit::scene::Scene;
@@ -69,37 +69,12 @@ impl Recorder {
     }
 }
 
-/// In the scene while its kernel is wrapped.
-struct Nothing;
-
 /// A kernel that others may hold, too.
 struct Shared(Arc<dyn Intersectable>);
 
 struct Recording {
     inner: Arc<dyn Intersectable>,
     tape: Tape,
-}
-
-impl Intersectable for Nothing {
-    fn bounds(&self) -> Aabb {
-        Aabb::EMPTY
-    }
-
-    fn intersect(&self, _: &Ray) -> Option<Hit> {
-        None
-    }
-
-    fn occluded(&self, _: &Ray) -> bool {
-        false
-    }
-
-    fn memory(&self) -> u64 {
-        0
-    }
-
-    fn describe(&self) -> String {
-        "nothing".into()
-    }
 }
 
 macro_rules! hand_on {

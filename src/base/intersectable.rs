@@ -56,6 +56,31 @@ pub trait Intersectable: Send + Sync {
     }
 }
 
+/// A kernel without geometry, for where there must be one before there is.
+pub struct Nothing;
+
+impl Intersectable for Nothing {
+    fn bounds(&self) -> Aabb {
+        Aabb::EMPTY
+    }
+
+    fn intersect(&self, _: &Ray) -> Option<Hit> {
+        None
+    }
+
+    fn occluded(&self, _: &Ray) -> bool {
+        false
+    }
+
+    fn memory(&self) -> u64 {
+        0
+    }
+
+    fn describe(&self) -> String {
+        "nothing".into()
+    }
+}
+
 /// What is asked of a ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum QueryKind {

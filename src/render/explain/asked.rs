@@ -1,7 +1,7 @@
 //! A kernel that keeps what another is asked and answers.
 
 use crate::base::hit::{Hit, HitBatch};
-use crate::base::intersectable::Intersectable;
+use crate::base::intersectable::{Intersectable, Nothing};
 use crate::base::ray::{Coherence, Ray, RayBatch};
 use crate::error::{Error, Result};
 use crate::math::aabb::Aabb;
@@ -108,30 +108,5 @@ impl Intersectable for Arc<Asked> {
 
     fn take_failure(&self) -> Result<()> {
         self.kernel().take_failure()
-    }
-}
-
-/// A kernel without geometry.
-struct Nothing;
-
-impl Intersectable for Nothing {
-    fn bounds(&self) -> Aabb {
-        Aabb::EMPTY
-    }
-
-    fn intersect(&self, _: &Ray) -> Option<Hit> {
-        None
-    }
-
-    fn occluded(&self, _: &Ray) -> bool {
-        false
-    }
-
-    fn memory(&self) -> u64 {
-        0
-    }
-
-    fn describe(&self) -> String {
-        "nothing".into()
     }
 }
