@@ -16,7 +16,7 @@
 //! # Whatever the noise
 //!
 //! Two renders with as many samples and seeds of their own could swap halves, and nobody would know: so halves are dealt
-//! anew, some hundred times ([`deals`]), and all of the above is asked of each deal. The verdict's probability is the share of
+//! anew, some hundred times (`deals`), and all of the above is asked of each deal. The verdict's probability is the share of
 //! deals that look as different. That is right for every kind of noise, fireflies too, and for however the families go
 //! together. A fit of normal noise ([`region`]) is not: metal under a low sun, where both halves of a pixel may find a
 //! firefly, was called different in 1.62 % of 10,000 pairs by it, noise of rare grey fireflies in 0.15 %. It stays, with

@@ -8,8 +8,8 @@
 //! have a V of rank 1. So V is first scaled by what rounding may do to each channel; directions with less variance than
 //! that are left out, and p is the number of those that stay.
 //!
-//! Where halves can be dealt anew, their covariance U over all deals takes the place of V ([`super::exchange`]): it is known,
-//! and p goes by chi-square, until [deals](super::deals) tell better. All below is for other pairs, and for the errors of
+//! Where halves can be dealt anew, their covariance U over all deals takes the place of V (`exchange`): it is known,
+//! and p goes by chi-square, until deals tell better. All below is for other pairs, and for the errors of
 //! single channels. Such pairs' p is never better than chi-square's by [`Finding::careful`]: points are spread so evenly over
 //! a pixel that both halves may find the same number of a sun's images, and V then knows nothing of them.
 //!
@@ -80,7 +80,7 @@ pub struct Finding {
     pub t2: f64,
     /// Degrees of freedom of the covariance.
     pub freedom: f64,
-    /// Whether `t2` is by the covariance of all deals ([`super::exchange`]), which is known, and not by its estimate.
+    /// Whether `t2` is by the covariance of all deals (`exchange`), which is known, and not by its estimate.
     pub is_known: bool,
     /// Squared distance by a covariance that the differences themselves are a third of; chi-square's probability of it is no
     /// better than that of F where F is right. Not where whole pictures are replicates.
