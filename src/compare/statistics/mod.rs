@@ -25,7 +25,7 @@
 //!
 //! A region is a set of pixels that is chosen without a look at the samples. Objects are those at the pixels' centres
 //! (layer `id`); by what a pixel's first sample met, pixels on outlines would be chosen by what makes them bright, and a disc of
-//! 512 pixels was called different in half of all pairs.
+//! 512 pixels was called different in two of four pairs.
 //!
 //! # What has no noise
 //!
