@@ -209,10 +209,11 @@ impl Worker {
             }
             self.flush(job);
         }
+        self.spent = Spent { plain: middle.since(&start), outlines: self.work.counts.since(&middle) };
+        // After what was spent is known: which layers are asked for has no say in how samples are dealt.
         if range.start == 0 && self.layers.has(Combine::Centre) {
             self.look_at_centres(job, rect);
         }
-        self.spent = Spent { plain: middle.since(&start), outlines: self.work.counts.since(&middle) };
     }
 
     /// Samples of one pixel, traced whenever a batch is full.

@@ -2,6 +2,7 @@
 
 use crate::common::{integrator, scene};
 use skylit::integrators::Integrator;
+use skylit::render::aov;
 use skylit::render::dealing::Dealing;
 use skylit::render::settings::RenderSettings;
 use skylit::render::{Rendered, Renderer, Silent};
@@ -85,6 +86,18 @@ fn the_same_rays_leave_less_error() {
     assert!((0.85..1.1).contains(&(needed_rays / even_rays)), "{needed_rays} {even_rays}");
     // A metal dragon has 0.6 of it (benches/README.md: 1.59 times the efficiency); eight renders tell either error to 10 %.
     assert!(needed < 0.85 * even, "{needed} {even}");
+}
+
+#[test]
+fn layers_have_no_say_in_numbers() {
+    let bench = Bench::new();
+    let plain = bench.render(|_| {});
+    // Rays through pixels' centres are nobody's samples, and no outline's cost.
+    for layer in ["id", "normal"] {
+        let with = bench.render(|s| s.aovs = aov::find(&[layer]).unwrap());
+        assert_eq!([with.stats.spp_least, with.stats.spp], [plain.stats.spp_least, plain.stats.spp]);
+        assert!(with.film == plain.film, "the same film with layer {layer} and without");
+    }
 }
 
 #[test]
