@@ -117,6 +117,57 @@ fn more_samples_in_one_picture_raise_no_alarm() {
     }
 }
 
+/// The same with what `change` makes of a half's value in a pixel.
+fn changed(of: &Replicates, change: impl Fn(usize, usize, f32) -> f32) -> Replicates {
+    let half = |h: usize| -> Values {
+        let all = (0..of.size[0] * of.size[1]).map(|pixel| (pixel, of.value(h, pixel)));
+        let new =
+            |(pixel, (v, n)): (usize, ([f64; 3], f64))| (v.map(|v| change(h, pixel, v as f32)), n as f32);
+        let (means, counts) = all.map(new).unzip();
+        (means, Some(counts))
+    };
+    Replicates::of_values(of.size, Spread::Pixels, vec![half(0), half(1)])
+}
+
+#[test]
+fn suns_that_both_halves_find_are_no_difference() {
+    // Points are spread so evenly that either half has as many of a sun's images in one pixel, but for the image's own noise.
+    let sun = |of: &Replicates, images: f32| {
+        changed(
+            of,
+            |half, pixel, v| if pixel == 48 * 30 + 30 { v + images * (2000.0 + half as f32) } else { v },
+        )
+    };
+    for spp in [16, 64] {
+        let [a, b] =
+            [(1, 16), (2, spp)].map(|(seed, spp)| picture(48, seed, spp, Noise::Normal, Colour::Grey));
+        assert_eq!(ask(&a, &b).outcome, Outcome::NoDifference, "{spp}");
+        let r = ask(&sun(&a, 1.0), &sun(&b, 2.0));
+        assert!(r.outcome == Outcome::NoDifference && r.p.is_some_and(|p| p > 0.05), "{spp}: {}", r.sentence);
+    }
+}
+
+#[test]
+fn noise_beside_a_very_bright_pixel_is_no_exact_difference() {
+    // The rounding of 13,000 is coarser than the noise of all others together.
+    let make = |seed: u64| {
+        let mut s = Stream::new(seed);
+        let mut half = || -> Values {
+            let mut value = |at: f64, sigma: f64| (at + sigma * s.uniform()) as f32;
+            // The bright one's own noise is grey.
+            let pixel = |i: usize| match i {
+                0 => [value(13_000.0, 0.05); 3],
+                _ => [0; 3].map(|_| value(0.5, 4e-5)),
+            };
+            ((0..256).map(pixel).collect(), Some(vec![8.0; 256]))
+        };
+        let parts = vec![half(), half()];
+        Replicates::of_values([16, 16], Spread::Pixels, parts)
+    };
+    let r = ask(&make(1), &make(2));
+    assert!(!r.whole.exact && r.outcome == Outcome::NoDifference, "{}", r.sentence);
+}
+
 fn object(r: &StatisticalResult, wanted: u32) -> &Region {
     let is_it = |p: &Place| matches!(p, Place::Object { number, .. } if *number == wanted);
     r.regions.iter().find(|r| is_it(&r.place)).unwrap()

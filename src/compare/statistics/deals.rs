@@ -31,7 +31,9 @@ const FEWEST: usize = 200;
 /// Deals at most.
 const MOST: usize = 10_000;
 
-/// Verdicts that are so far below their level need no deals: chi-square's tail is careful by less than this factor there.
+/// Verdicts that are below their level by this factor need no deals. By moments ([`super::exchange`]) no tail is longer than
+/// Chernoff's bound for chi-square (x / p)^(p / 2) exp((p - x) / 2), with p = 3 32 times chi-square's own tail where that is
+/// 1e-6, and 107 times at 1e-21: not the ten thousand that would be needed.
 pub const SURE: f64 = 1e-4;
 
 /// Probabilities that are apart by no more are the same but for rounding.
@@ -159,9 +161,9 @@ impl Standings {
         self.regions.iter_mut().zip(&round.regions).for_each(|(s, p)| s.count(p[lane]));
     }
 
-    /// A number in 0 to 1 for a tile's place, the same whenever these pictures are compared.
-    pub fn lot(&self, tile: usize) -> f64 {
-        (mix64(self.seed ^ mix64(!(tile as u64))) >> 11) as f64 / (1u64 << 53) as f64
+    /// A number in 0 to 1 for the place of a tile or region, the same whenever these pictures are compared.
+    pub fn lot(&self, number: usize) -> f64 {
+        (mix64(self.seed ^ mix64(!(number as u64))) >> 11) as f64 / (1u64 << 53) as f64
     }
 }
 
@@ -294,7 +296,8 @@ pub fn deal(
     let deck = Deck::new(pair, tiles, regions);
     let says = |round: &Round, lane: usize| weights.verdict(round.ps(lane, found));
     let mut all = Standings::new(&deck.deal(None, found), &says, deck.seed);
-    // So many that the level is reached where LEAST say as much, and not just below it.
+    // So many that the level is reached where LEAST say as much, and not just below it. For levels below LEAST / MOST
+    // chi-square's probability decides, where few deals say as much.
     let wanted = ((LEAST as f64 / alpha) as usize).clamp(FEWEST, MOST) - 1;
     for number in 0.. {
         let round = deck.deal(Some(number), found);

@@ -77,8 +77,8 @@ impl StatisticalResult {
             Some(u) if u.p >= self.alpha => {
                 format!("uniform, as without a difference (Kolmogorov p {:.2})", u.p)
             }
-            // By a fit of normal noise, see `region`: few pixels have the noise, or unlike numbers of samples.
-            Some(u) if self.deals == 0 && self.outcome == Outcome::NoDifference => {
+            // Few pixels have the noise, or numbers of samples are unlike.
+            Some(u) if self.whole.finding.careful.is_some() && self.outcome == Outcome::NoDifference => {
                 format!("not uniform (Kolmogorov p {:.1e}): the test is careful here", u.p)
             }
             Some(u) => format!("not uniform (Kolmogorov p {:.1e})", u.p),

@@ -82,8 +82,9 @@ pub struct Finding {
     pub freedom: f64,
     /// Whether `t2` is by the covariance of all deals (`exchange`), which is known, and not by its estimate.
     pub is_known: bool,
-    /// Squared distance by a covariance that the differences themselves are a third of; chi-square's probability of it is no
-    /// better than that of F where F is right. Not where whole pictures are replicates.
+    /// Squared distance by a covariance that the differences themselves are a third of, so that a single pixel's never exceeds
+    /// 3: the probability is at least chi-square's of it. None where that is not asked: where halves are dealt, or whole pictures
+    /// are replicates.
     pub careful: Option<f64>,
     /// Red, green, blue, luminance.
     pub contrasts: [Contrast; 4],

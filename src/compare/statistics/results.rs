@@ -9,7 +9,8 @@ use super::region::{Contrast, Finding};
 use super::{CONFIDENCE, POWER};
 use serde::Serialize;
 
-/// A share with its interval of [`CONFIDENCE`].
+/// A share with its interval of [`CONFIDENCE`], by the spread of replicates and Student's t: too narrow where a few pixels have
+/// the noise and their halves agree by chance, which p is not.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Share {
     /// Difference over the reference; -0.01 is 1 % too dark.
